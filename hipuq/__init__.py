@@ -1,0 +1,7 @@
+"""Uncertainty quantification of friction-induced instability of hip implants."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+__version__ = "0.1.0"

@@ -1,0 +1,20 @@
+from . import cea as cea
+from . import models as models
+from . import plots as plots
+from .contact import ContactPatterns as ContactPatterns
+from .driver import design as design
+from .driver import estimate as estimate
+from .driver import run as run
+from .errors import HipuqError as HipuqError
+from .evaluation import evaluate as evaluate
+from .inputs import Inputs as Inputs
+from .inputs import relative as relative
+from .inputs import shift as shift
+from .store import load_outcomes as load_outcomes
+from .store import load_results as load_results
+from .store import save_outcomes as save_outcomes
+from .store import save_results as save_results
+from .study import load_study as load_study
+from .study import run_study as run_study
+
+__version__: str

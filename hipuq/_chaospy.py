@@ -1,0 +1,130 @@
+"""The only place that imports chaospy.
+
+Importing chaospy reconfigures the root logger; `load` puts it back as it was. Its discrete
+distributions invert to numbers between the levels, so they are mapped to their levels here.
+"""
+
+from __future__ import annotations
+
+import ast
+import logging
+import sys
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hipuq.errors import InputError, unknown_name
+
+Array = NDArray[np.float64]
+
+
+def load() -> ModuleType:
+    """Import chaospy and leave the root logger as it was."""
+    if "chaospy" not in sys.modules:
+        root = logging.getLogger()
+        level, handlers = root.level, list(root.handlers)
+        import chaospy  # noqa: F401
+
+        root.setLevel(level)
+        for handler in [handler for handler in root.handlers if handler not in handlers]:
+            root.removeHandler(handler)
+            handler.close()
+    return sys.modules["chaospy"]
+
+
+def is_distribution(value: object) -> bool:
+    """Say whether `value` is a chaospy distribution, without importing chaospy."""
+    chaospy = sys.modules.get("chaospy")
+    return chaospy is not None and isinstance(value, chaospy.Distribution)
+
+
+def length(distribution: Any) -> int:
+    """Return the number of variables of a chaospy distribution."""
+    return len(distribution)
+
+
+def support(distribution: Any) -> tuple[float, float]:
+    """Return the lower and upper end of a one-dimensional distribution."""
+    lower, upper = float(distribution.lower[0]), float(distribution.upper[0])
+    if distribution.interpret_as_integer:
+        return lower + 0.5, upper - 0.5
+    return lower, upper
+
+
+def ppf(distribution: Any, u: Array) -> Array:
+    """Return the quantiles at `u`, any shape, levels for a discrete distribution."""
+    if distribution.interpret_as_integer:
+        lower, upper = support(distribution)
+        levels = np.arange(lower, upper + 1)
+        cumulative = np.asarray(distribution.cdf(levels + 0.5), dtype=np.float64)
+        cumulative[-1] = 1.0
+        found: Array = levels[np.searchsorted(cumulative, u, side="left").clip(0, len(levels) - 1)]
+        return found
+    flat = np.asarray(distribution.inv(np.ravel(u)), dtype=np.float64)
+    return flat.reshape(np.shape(u))
+
+
+def cdf(distribution: Any, x: Array) -> Array:
+    """Return the cumulative probability at `x`, any shape."""
+    at = np.floor(x) + 0.5 if distribution.interpret_as_integer else x
+    flat = np.asarray(distribution.cdf(np.ravel(at)), dtype=np.float64)
+    return flat.reshape(np.shape(x))
+
+
+def to_dict(distribution: Any) -> dict[str, Any]:
+    """Return class names and arguments of a distribution, read from its representation."""
+    expression = ast.parse(repr(distribution), mode="eval").body
+    description: dict[str, Any] = _call_to_dict(expression)
+    return description
+
+
+def _call_to_dict(node: ast.expr) -> Any:
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        return {
+            "name": node.func.id,
+            "args": [_call_to_dict(arg) for arg in node.args],
+            "kwargs": {str(pair.arg): _call_to_dict(pair.value) for pair in node.keywords},
+        }
+    return ast.literal_eval(node)
+
+
+def from_dict(data: dict[str, Any]) -> Any:
+    """Return the distribution that `to_dict` describes.
+
+    Raises
+    ------
+    UnknownNameError
+        If chaospy has no such distribution.
+    InputError
+        If it does not take these arguments.
+    """
+    chaospy = load()
+    name = data["name"]
+    cls = getattr(chaospy, name, None)
+    if not (isinstance(cls, type) and issubclass(cls, chaospy.Distribution)):
+        raise unknown_name("chaospy distribution", name, names())
+    try:
+        return cls(
+            *(_argument(arg) for arg in data.get("args", ())),
+            **{key: _argument(value) for key, value in data.get("kwargs", {}).items()},
+        )
+    except (TypeError, ValueError, AssertionError) as error:
+        raise InputError(f"chaospy.{name} does not take these arguments: {error}") from error
+
+
+def _argument(value: Any) -> Any:
+    return from_dict(value) if isinstance(value, dict) else value
+
+
+def names() -> list[str]:
+    """Return the names of chaospy's distributions."""
+    chaospy = load()
+    return sorted(
+        name
+        for name in dir(chaospy)
+        if isinstance(getattr(chaospy, name), type)
+        and issubclass(getattr(chaospy, name), chaospy.Distribution)
+        and name != "Distribution"
+    )

@@ -1,0 +1,11 @@
+"""Complex eigenvalue analysis: matrices in, spectra out; NumPy only, nothing of uncertainty.
+
+The eigenvalue problem is ``(l**2 M + l C + K0 + mu K1) y = 0`` (Oberst et al., INTER-NOISE 2016,
+eq. 1). Frequency is ``Im l / (2 pi)``, growth rate ``Re l``, damping ratio ``-Re l / abs(l)``.
+"""
+
+from hipuq.cea.modes import ModeShapes, mode_shapes
+from hipuq.cea.pencils import Pencils
+from hipuq.cea.spectrum import Spectra, damping_ratio, solve
+
+__all__ = ["ModeShapes", "Pencils", "Spectra", "damping_ratio", "mode_shapes", "solve"]

@@ -1,0 +1,69 @@
+"""How far a computed eigenvalue may be from the true one, in double precision."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hipuq.cea.pencils import Array
+
+Complex = NDArray[np.complex128]
+
+EPS = float(np.finfo(np.float64).eps)
+
+FILTER = 3e-5
+"""Radius, relative to the norm, within which an eigenvalue is trusted without a condition number.
+
+Ten times the largest error at which a wrong verdict was seen, in 18,000 ring matrices judged by
+exact arithmetic (nominal, scattered and near an onset); ``tests/validate_filter.py`` repeats it."""
+
+SAFETY = 30.0
+"""Factor on the first-order bound eps * norm * condition number.
+
+The bound is of first order, so a factor is needed near a defective matrix. In the same comparison
+a factor of 1 left no wrong verdict."""
+
+ZERO = 1e-12
+"""A declared mechanism's root counts as zero up to this times the norm."""
+
+
+def norms(matrices: Array) -> Array:
+    """Return the Frobenius norm of each matrix, (s,)."""
+    norm: Array = np.sqrt(np.square(matrices).sum(axis=(1, 2)))
+    return norm
+
+
+def conditioned_eigenvalues(matrices: Array) -> tuple[Complex, Array]:
+    """Return eigenvalues and their first-order error bounds.
+
+    The condition number of a simple eigenvalue with right and left eigenvectors x, y is
+    ``|x| |y| / |y^H x|``; an eigenvalue of a matrix known to eps * norm moves by that times eps *
+    norm (Golub and Van Loan, Matrix Computations, section 7.2.2).
+
+    Parameters
+    ----------
+    matrices : (s, n, n) array
+
+    Returns
+    -------
+    values : (s, n) complex array
+    radius : (s, n) array
+        SAFETY * eps * norm * condition number, infinite where the eigenvectors are dependent.
+    """
+    values, right = np.linalg.eig(matrices)
+    try:
+        left = np.linalg.inv(right)
+    except np.linalg.LinAlgError:
+        left = np.stack([_inverse(one) for one in right])
+    # The rows of the inverse are left eigenvectors with y^H x = 1.
+    condition = np.linalg.norm(left, axis=2) * np.linalg.norm(right, axis=1)
+    condition = np.where(np.isfinite(condition), condition, np.inf)
+    return values.astype(np.complex128), SAFETY * EPS * norms(matrices)[:, None] * condition
+
+
+def _inverse(matrix: Complex) -> Complex:
+    """Return the inverse, infinite where there is none."""
+    try:
+        return np.linalg.inv(matrix).astype(np.complex128)
+    except np.linalg.LinAlgError:
+        return np.full_like(matrix, np.inf)

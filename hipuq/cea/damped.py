@@ -1,0 +1,107 @@
+"""Damped modes: the state space of ``l**2 + l D + A``, time scaled so that its entries are near 1."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hipuq.cea.bounds import EPS, FILTER, Complex, conditioned_eigenvalues, norms
+from hipuq.cea.pencils import Array
+
+Mask = NDArray[np.bool_]
+
+
+def damped_modes(
+    stiffness: Array, damping: Array, mechanisms: NDArray[np.intp], threshold: float
+) -> tuple[Array, Array, Mask, Array]:
+    """Return the modes of a batch by ascending frequency.
+
+    A state space of n degrees of freedom has 2n eigenvalues: each complex pair is one mode, and so
+    are two real ones, with frequency 0 and the larger real part: the larger half of the real
+    eigenvalues. So there are always n modes.
+
+    Parameters
+    ----------
+    stiffness : (s, n, n) array
+        A [1/s^2].
+    damping : (s, n, n) array
+        D [1/s].
+    mechanisms : (s,) array of int
+        Dimension of the null space of A by construction. It is taken out before the eigenvalues
+        are computed, because its double eigenvalue 0 is defective in the state space.
+    threshold : float
+        Growth rate above which a mode is unstable [1/s].
+
+    Returns
+    -------
+    frequency, growth_rate : (s, n) array
+        [Hz], [1/s].
+    known : (s, n) array of bool
+        Whether the side of the threshold on which a mode lies is beyond rounding.
+    margin : (s,) array
+        (threshold - largest growth rate) / root mean w [1].
+    """
+    s, n = stiffness.shape[:2]
+    frequency = np.zeros((s, n))
+    growth = np.zeros((s, n))
+    known = np.ones((s, n), bool)
+    largest = np.empty(s)
+    for m in np.unique(mechanisms):
+        rows = np.flatnonzero(mechanisms == m)
+        part, drag, taken = _without_mechanisms(stiffness[rows], damping[rows], int(m))
+        frequency[rows, m:], growth[rows, m:], certain = _state_space_modes(part, drag, threshold)
+        known[rows, m:] = certain & taken[:, None]
+        known[rows, :m] = taken[:, None]
+        largest[rows] = growth[rows, m:].max(axis=1)
+    mean = np.abs(np.trace(stiffness, axis1=1, axis2=2)) / (n - mechanisms)
+    return frequency, growth, known, (threshold - largest) / np.sqrt(mean)
+
+
+def _state_space_modes(stiffness: Array, damping: Array, threshold: float) -> tuple[Array, Array, Mask]:
+    """Return frequency, growth rate and whether the verdict is known, of n modes; (s, n)."""
+    s, n = stiffness.shape[:2]
+    # Frobenius norms of A are sums of squared frequencies; the root puts l / rate near 1.
+    rate = np.sqrt(np.maximum(norms(stiffness), np.finfo(np.float64).tiny))
+    states = np.zeros((s, 2 * n, 2 * n))
+    states[:, :n, n:] = np.eye(n)
+    states[:, n:, :n] = -stiffness / np.square(rate)[:, None, None]
+    states[:, n:, n:] = -damping / rate[:, None, None]
+    values: Complex = np.linalg.eigvals(states).astype(np.complex128)
+    radius = np.broadcast_to(FILTER * norms(states)[:, None], values.shape)
+    limit = (threshold / rate)[:, None]
+    known = np.abs(values.real - limit) > radius
+    flagged = np.flatnonzero(~known.all(axis=1))
+    if flagged.size:
+        values[flagged], radius = conditioned_eigenvalues(states[flagged])
+        known[flagged] = np.abs(values[flagged].real - limit[flagged]) > radius
+    # Upper complex ones first, then real ones from the largest down: the first n are the modes.
+    kind = np.sign(values.imag)
+    order = np.lexsort((-values.real, -kind), axis=1)[:, :n]
+    values, known = np.take_along_axis(values, order, 1), np.take_along_axis(known, order, 1)
+    values *= rate[:, None]
+    order = np.lexsort((values.real, values.imag), axis=1)
+    values, known = np.take_along_axis(values, order, 1), np.take_along_axis(known, order, 1)
+    return values.imag / (2 * np.pi), values.real, known
+
+
+def _without_mechanisms(stiffness: Array, damping: Array, m: int) -> tuple[Array, Array, Mask]:
+    """Return A and D on the complement of the mechanisms, and whether they could be taken out.
+
+    With V a basis of the null space of A and Q of its complement, A V = 0, so the eigenvalues
+    other than 0 of A are those of ``Q^T A Q``. The same reduction holds for D if it maps the null
+    space into itself, and then the mechanisms obey ``l (l + V^T D V)``: they rest or decay.
+    """
+    if m == 0:
+        return stiffness, damping, np.ones(len(stiffness), bool)
+    n = stiffness.shape[1]
+    _, singular, right = np.linalg.svd(stiffness)
+    null, rest = right[:, n - m :], right[:, : n - m]
+    dragged = damping @ null.transpose(0, 2, 1)
+    own = null @ dragged
+    stray = norms(dragged - null.transpose(0, 2, 1) @ own)
+    rounding = 10 * n * EPS
+    taken = singular[:, n - m] <= rounding * singular[:, 0]
+    taken &= stray <= 1e3 * rounding * norms(damping)
+    taken &= np.linalg.eigvalsh(own)[:, 0] >= -1e3 * rounding * norms(damping)
+    across = rest.transpose(0, 2, 1)
+    return rest @ stiffness @ across, rest @ damping @ across, taken

@@ -1,0 +1,148 @@
+"""The three stages by name of the method, and all of them in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from typing import Any
+
+import xarray as xr
+
+from hipuq.errors import InputError, unknown_name
+from hipuq.evaluation import evaluate
+from hipuq.inputs import Inputs
+from hipuq.methods import METHODS, Method
+from hipuq.sampling import Seed, seed_of, spawn
+
+
+def method_named(name: str) -> Method:
+    """Return a method by name.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none.
+    """
+    if name not in METHODS:
+        raise unknown_name("method", name, METHODS)
+    return METHODS[name]
+
+
+def design(
+    method: str, inputs: Inputs, n: int, rng: Seed = None, *, rows: slice | None = None, **options: Any
+) -> xr.Dataset:
+    """Return the samples that a method wants evaluated.
+
+    Parameters
+    ----------
+    method : str
+        Name of a method.
+    inputs : Inputs
+        The uncertain parameters.
+    n : int
+        Size of the design; what it counts is the method's to say.
+    rng : int or Generator, optional
+        Seed; without it one from the operating system, which the attribute ``seed`` then names.
+    rows : slice, optional
+        Only these rows of the design; needs an integer seed to belong to the same design.
+    **options
+        Options of the method's design.
+
+    Returns
+    -------
+    Dataset
+        Over ``sample``, one variable for each uncertain parameter.
+    """
+    _check_inputs(inputs)
+    record = method_named(method)
+    allowed = record.options("design")
+    for name in options:
+        if name not in allowed:
+            raise unknown_name(f"option of the design of {record.title}", name, allowed)
+    return record.design(inputs, n, rng, rows=rows, **options)
+
+
+def estimate(
+    method: str, outcomes: xr.Dataset, inputs: Inputs, *, of: str, rng: Seed = None, **options: Any
+) -> xr.Dataset:
+    """Return the results of a method from outcomes.
+
+    Parameters
+    ----------
+    method : str
+        Name of a method.
+    outcomes : Dataset
+        As from `evaluate`.
+    inputs : Inputs
+        The inputs of the design.
+    of : str
+        Name of the outcome to analyse.
+    rng : int or Generator, optional
+        Seed of resampling, where the method does any; by default from the design's.
+    **options
+        Options of the method's estimate.
+
+    Returns
+    -------
+    Dataset
+    """
+    _check_inputs(inputs)
+    record = method_named(method)
+    allowed = record.options("estimate")
+    for name in options:
+        if name not in allowed:
+            raise unknown_name(f"option of the estimate of {record.title}", name, allowed)
+    return record.estimate(outcomes, inputs, of=of, rng=rng, **options)
+
+
+def run(
+    model: Callable[..., xr.Dataset],
+    inputs: Inputs,
+    *,
+    method: str,
+    n: int,
+    of: str,
+    rng: Seed = None,
+    n_jobs: int | None = None,
+    executor: Executor | None = None,
+    progress: bool | None = None,
+    **options: Any,
+) -> xr.Dataset:
+    """Design, evaluate and estimate in one call.
+
+    Parameters
+    ----------
+    model : callable
+        Samples Dataset -> outcomes Dataset.
+    inputs : Inputs
+        The uncertain parameters.
+    method : str
+        Name of a method.
+    n : int
+        Size of the design.
+    of : str
+        Name of the outcome to analyse; nothing else is evaluated.
+    rng : int or Generator, optional
+        Seed.
+    n_jobs, executor, progress
+        As in `evaluate`.
+    **options
+        Options of the method; each stage gets its own.
+
+    Returns
+    -------
+    Dataset
+        Results, as from `estimate`.
+    """
+    _check_inputs(inputs)
+    record = method_named(method)
+    designing, estimating = record.split(options)
+    seed = seed_of(rng)
+    samples = record.design(inputs, n, seed, **designing)
+    outcomes = evaluate(model, samples, keep=[of], n_jobs=n_jobs, executor=executor, progress=progress)
+    return record.estimate(outcomes, inputs, of=of, rng=spawn(seed, 2**31), **estimating)
+
+
+def _check_inputs(inputs: object) -> None:
+    if not isinstance(inputs, Inputs):
+        raise InputError(f"inputs is {type(inputs).__name__}: give hipuq.Inputs(...) or model.inputs(...)")

@@ -1,0 +1,196 @@
+"""Samples and a model give outcomes: in blocks, on all cores, the same bits however it is divided."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from hipuq import schema
+from hipuq.errors import HipuqError, InputError, ModelError, SchemaError, unknown_name
+from hipuq.sampling import check_count
+
+Model = Callable[..., xr.Dataset]
+
+BLOCK = 1024
+"""Samples handed to the model at a time."""
+
+
+def evaluate(
+    model: Model,
+    samples: xr.Dataset,
+    *,
+    keep: Iterable[str] | None = None,
+    n_jobs: int | None = None,
+    executor: Executor | None = None,
+    progress: bool | None = None,
+) -> xr.Dataset:
+    """Evaluate a model on samples.
+
+    Parameters
+    ----------
+    model : callable
+        ``samples Dataset -> Dataset of outputs over the same samples``. If it has an attribute
+        ``outcomes``, the names it can give, it is called with ``keep=``; if it has a method
+        ``check``, that sees all samples first.
+    samples : Dataset
+        Over ``sample``; see `hipuq.schema.check_samples`.
+    keep : iterable of str, optional
+        Outcomes wanted; nothing else is computed (where the model knows how) or stored.
+    n_jobs : int, optional
+        Threads; all cores by default.
+    executor : concurrent.futures.Executor, optional
+        Runs the blocks instead of threads.
+    progress : bool, optional
+        Whether to show a progress bar; by default on a terminal.
+
+    Returns
+    -------
+    Dataset
+        The samples, what the model gave, and ``status``. Results do not depend on `n_jobs` or
+        `executor`; the attribute ``seconds`` and the time in ``history`` do.
+
+    Raises
+    ------
+    SchemaError
+        If samples or outputs do not follow the contract.
+    ModelError
+        If the model fails; its message names the samples.
+    """
+    size = schema.check_samples(samples)
+    names = None if keep is None else _checked_names(model, keep)
+    checker = getattr(model, "check", None)
+    if callable(checker):
+        checker(samples)
+    jobs = (os.cpu_count() or 1) if n_jobs is None else check_count("n_jobs", n_jobs)
+    blocks = [slice(start, min(start + BLOCK, size)) for start in range(0, size, BLOCK)]
+    started = time.perf_counter()
+    parts: list[xr.Dataset | None] = [None] * len(blocks)
+    with _workers(jobs, executor) as pool, _progress(size, progress) as advance:
+        futures: dict[Future[xr.Dataset], int] = {
+            pool.submit(_block, model, samples.isel(sample=rows), names, rows.start): i
+            for i, rows in enumerate(blocks)
+        }
+        try:
+            for future in as_completed(futures):
+                i = futures[future]
+                parts[i] = future.result()
+                advance(blocks[i].stop - blocks[i].start)
+        except BaseException:
+            for future in futures:
+                future.cancel()
+            raise
+    outputs = _joined([part for part in parts if part is not None])
+    outcomes = samples.assign(outputs.data_vars).assign_coords(outputs.coords)
+    if "status" not in outcomes:
+        outcomes["status"] = _status(outcomes)
+    label = getattr(model, "label", getattr(model, "__qualname__", type(model).__qualname__))
+    options = {"model": getattr(model, "options", {"model": label})}
+    outcomes = schema.stamp(
+        outcomes, f"evaluate {label} on {size} samples", model=label, options=options, like=samples.attrs
+    )
+    return outcomes.assign_attrs(seconds=time.perf_counter() - started)
+
+
+def _checked_names(model: Model, keep: Iterable[str]) -> tuple[str, ...]:
+    """Return the outcomes to keep, known ones if the model says which it has."""
+    if isinstance(keep, str):
+        raise InputError(f"keep is {keep!r}: it must be a list of outcome names, [{keep!r}]")
+    names = tuple(dict.fromkeys(keep))
+    if not names:
+        raise InputError("keep is empty: name at least one outcome, or leave it out for all")
+    known = getattr(model, "outcomes", None)
+    for name in names:
+        if known is not None and name not in known:
+            raise unknown_name("outcome in keep", name, known)
+    return names
+
+
+def _block(model: Model, samples: xr.Dataset, keep: tuple[str, ...] | None, start: int) -> xr.Dataset:
+    """Return the model's outputs over one block, checked, without coords over sample."""
+    size = samples.sizes["sample"]
+    try:
+        given = model(samples) if keep is None or not hasattr(model, "outcomes") else model(samples, keep)
+    except HipuqError:
+        raise
+    except Exception as error:
+        raise ModelError(
+            f"the model failed on samples {start} to {start + size - 1}: {type(error).__name__}: {error}"
+        ) from error
+    if not isinstance(given, xr.Dataset):
+        raise SchemaError(f"the model must return an xarray Dataset, not {type(given).__name__}")
+    both = [str(name) for name in given.data_vars if name in samples.variables]
+    if both:
+        raise SchemaError(
+            f"the model returned {both[0]!r}, which is a name in the samples: return the outputs alone"
+        )
+    for name, values in given.data_vars.items():
+        if values.sizes.get("sample") != size:
+            raise SchemaError(
+                f"output {str(name)!r} of the model has the dims {dict(values.sizes)}: "
+                f"it needs 'sample' of length {size}"
+            )
+    if keep is not None:
+        missing = [name for name in keep if name not in given]
+        if missing:
+            raise unknown_name("outcome in keep", missing[0], [str(name) for name in given.data_vars])
+        always = [name for name in ("status", "decided_by") if name in given and name not in keep]
+        given = given[[*keep, *always]]
+    return given.drop_vars([name for name in given.coords if "sample" in given[name].dims])
+
+
+def _joined(parts: list[xr.Dataset]) -> xr.Dataset:
+    """Return the blocks one after the other; xr.concat would compare coords block by block."""
+    first = parts[0]
+    data: dict[Any, Any] = {}
+    for name, values in first.data_vars.items():
+        if any(name not in part or part[name].dims != values.dims for part in parts):
+            raise SchemaError(f"the model returned {str(name)!r} with different dims in different blocks")
+        axis = values.dims.index("sample")
+        data[name] = (values.dims, np.concatenate([p[name].values for p in parts], axis), values.attrs)
+    return xr.Dataset(data, coords=first.coords)
+
+
+def _status(outcomes: xr.Dataset) -> xr.DataArray:
+    """Return the status of outcomes of a model that gives none."""
+    status = np.full(outcomes.sizes["sample"], schema.STATUS["ok"], np.int8)
+    if "any_unstable" in outcomes:
+        status[np.isnan(outcomes["any_unstable"].values.astype(float))] = schema.STATUS["undecided"]
+    attrs = schema.flag_attrs("status of the sample", schema.STATUS)
+    return xr.DataArray(status, dims="sample", attrs=attrs)
+
+
+@contextmanager
+def _workers(jobs: int, executor: Executor | None) -> Iterator[Executor]:
+    """Give the executor, or threads with one BLAS thread each: the matrices are small."""
+    if executor is not None:
+        if not callable(getattr(executor, "submit", None)):
+            raise InputError(f"executor is {executor!r}: it must be a concurrent.futures.Executor")
+        yield executor
+        return
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(jobs) as pool:
+        yield pool
+
+
+@contextmanager
+def _progress(size: int, wanted: bool | None) -> Iterator[Callable[[int], None]]:
+    """Give a function that advances a progress bar, or does nothing."""
+    if not (sys.stderr.isatty() if wanted is None else wanted):
+        yield lambda done: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("samples", total=size)
+        yield lambda done: bar.advance(task, done)

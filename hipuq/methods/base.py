@@ -1,0 +1,118 @@
+"""What methods share: their record, and designs made by blocks of rows."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from hipuq import schema
+from hipuq.errors import InputError, unknown_name
+from hipuq.inputs import Inputs
+from hipuq.sampling import BLOCK
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method of analysis.
+
+    Attributes
+    ----------
+    title : str
+        Its name in tables and figures.
+    design : callable
+        ``(inputs, n, rng, *, rows=None, **options) -> samples``.
+    estimate : callable
+        ``(outcomes, inputs, *, of, rng=None, **options) -> results``.
+    evaluations : callable
+        ``(inputs, n, **options of design) -> int``.
+    refine : callable or None
+        ``(outcomes, inputs, rng, **options) -> samples or None``, of a sequential method.
+    """
+
+    title: str
+    design: Callable[..., xr.Dataset]
+    estimate: Callable[..., xr.Dataset]
+    evaluations: Callable[..., int]
+    refine: Callable[..., xr.Dataset | None] | None = None
+
+    def options(self, stage: str) -> dict[str, Any]:
+        """Return the options of ``"design"`` or ``"estimate"`` with their defaults."""
+        signature = inspect.signature(getattr(self, stage))
+        return {
+            name: parameter.default
+            for name, parameter in signature.parameters.items()
+            if parameter.kind is parameter.KEYWORD_ONLY and name not in ("rows", "of", "rng")
+        }
+
+    def split(self, options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return the options of design and those of estimate.
+
+        Raises
+        ------
+        UnknownNameError
+            If an option belongs to neither.
+        """
+        design, estimate = self.options("design"), self.options("estimate")
+        for name in options:
+            if name not in design and name not in estimate:
+                raise unknown_name(f"option of {self.title}", name, [*design, *estimate])
+        return (
+            {name: value for name, value in options.items() if name in design},
+            {name: value for name, value in options.items() if name in estimate},
+        )
+
+
+def rows_of(total: int, rows: slice | None) -> slice:
+    """Return `rows` with a start and a stop.
+
+    Raises
+    ------
+    InputError
+        If they are not rows of a design of `total` samples.
+    """
+    if rows is None:
+        return slice(0, total)
+    start = 0 if rows.start is None else rows.start
+    stop = total if rows.stop is None else rows.stop
+    if rows.step not in (None, 1) or not 0 <= start < stop <= total:
+        raise InputError(f"rows is {rows}: it must be a slice without a step inside 0 to {total}")
+    return slice(start, stop)
+
+
+def samples_by_block(inputs: Inputs, points: Callable[[slice], Array], rows: slice, total: int) -> xr.Dataset:
+    """Return rows of a design, mapped to physical values in fixed blocks.
+
+    Quantile functions that iterate to convergence may stop differently in another company, so each
+    block is always mapped whole.
+
+    Parameters
+    ----------
+    inputs : Inputs
+    points : callable
+        Rows -> points of the unit cube, (rows, dimension).
+    rows : slice
+        The rows wanted.
+    total : int
+        Rows of the whole design.
+
+    Returns
+    -------
+    Dataset
+        Over ``sample``, numbered by row.
+    """
+    parts = []
+    for start in range(rows.start // BLOCK * BLOCK, rows.stop, BLOCK):
+        stop = min(start + BLOCK, total)
+        part = inputs.samples(points(slice(start, stop)))
+        parts.append(part.isel(sample=slice(max(rows.start - start, 0), rows.stop - start)))
+    whole = parts[0] if len(parts) == 1 else xr.concat(parts, "sample", data_vars="all", join="exact")
+    numbers = np.arange(rows.start, rows.stop)
+    return whole.assign_coords(sample=("sample", numbers, schema.COORDINATES["sample"].attrs))

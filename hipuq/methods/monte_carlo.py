@@ -1,0 +1,258 @@
+"""Monte Carlo: the share of unstable samples, or the mean of anything, with its interval.
+
+Plain random samples, a latin hypercube or scrambled Sobol points; over everything at once or
+stratified over the levels of a discrete input, n draws each, as Oberst et al. (INTER-NOISE 2016) do
+with contact patterns. Points that are not independent need replicates to show their own error.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from hipuq import schema
+from hipuq.errors import InputError, unknown_name
+from hipuq.inputs import Inputs
+from hipuq.methods.base import rows_of, samples_by_block
+from hipuq.methods.intervals import check_confidence, student, wilson
+from hipuq.methods.reduction import Moments, moments
+from hipuq.methods.results import Kind, finished, kind_of, labelled, levels_of, with_summaries
+from hipuq.sampling import SAMPLERS, Seed, check_count, seed_of, unit_points
+
+Array = NDArray[np.float64]
+
+REPLICATES = {"random": 1, "latin_hypercube": 8, "sobol": 8}
+"""Replicates by sampler where none are asked for: what its own error bar needs."""
+
+
+def design(
+    inputs: Inputs,
+    n: int,
+    rng: Seed,
+    *,
+    rows: slice | None = None,
+    sampler: str = "random",
+    stratify: str | bool = False,
+    replicates: int | None = None,
+) -> xr.Dataset:
+    """Return samples of the inputs.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        The uncertain parameters.
+    n : int
+        Number of samples; for each level in a stratified design. All replicates together.
+    rng : int or Generator
+        Seed.
+    rows : slice, optional
+        Only these rows of the design.
+    sampler : str
+        ``"random"``, ``"latin_hypercube"`` or ``"sobol"``.
+    stratify : str or bool
+        Name of the discrete input of which every level gets n samples; True for the only one.
+    replicates : int, optional
+        Number of independent designs that n is divided into: 1 for ``"random"``, else 8.
+
+    Returns
+    -------
+    Dataset
+        Coords ``replicate(sample)``, if there are several, and in a stratified design the level's
+        number and ``weight(sample)``, its probability.
+
+    Raises
+    ------
+    InputError
+        If n does not suit the sampler or the replicates.
+    """
+    share, parts, levels = _plan(inputs, n, sampler, stratify, replicates)
+    seed = seed_of(rng)
+    name, rest = _stratum(inputs, stratify)
+    strata = 1 if levels is None else levels.sizes[levels.attrs["dim"]]
+    total = strata * parts * share
+    wanted = rows_of(total, rows)
+
+    def points(part: slice) -> Array:
+        pieces = []
+        for cell in range(part.start // share, -(-part.stop // share)):
+            inside = slice(max(part.start - cell * share, 0), min(part.stop - cell * share, share))
+            pieces.append(unit_points(sampler, share, rest.dimension, seed, divmod(cell, parts), inside))
+        return np.concatenate(pieces)
+
+    samples = samples_by_block(rest, points, wanted, total)
+    numbers = samples["sample"].values
+    if parts > 1:
+        replicate = numbers // share % parts + 1
+        samples = samples.assign_coords(
+            replicate=("sample", replicate, schema.COORDINATES["replicate"].attrs)
+        )
+    if levels is not None:
+        level = numbers // (share * parts)
+        dim = levels.attrs["dim"]
+        along = {key: levels[key].variable.isel({dim: level}) for key in (name, dim, *_carried(levels))}
+        drawn = {key: (("sample", *part.dims[1:]), part.values, part.attrs) for key, part in along.items()}
+        samples = samples.assign({name: drawn.pop(name)}).assign_coords(drawn)
+        samples = samples.assign_coords({d: levels[d] for d in levels[name].dims[1:]})
+    options = {"design": {"n": n, "sampler": sampler, "stratify": name or False, "replicates": parts}}
+    return schema.stamp(
+        samples,
+        f"design monte_carlo, {total} samples",
+        method="monte_carlo",
+        seed=seed,
+        options=options,
+        inputs=inputs.to_json(),
+    )
+
+
+def _carried(levels: xr.Dataset) -> list[str]:
+    """Return what samples of a stratum carry besides its number: its weight and group."""
+    return ["weight", levels.attrs["group"]]
+
+
+def evaluations(
+    inputs: Inputs,
+    n: int,
+    *,
+    sampler: str = "random",
+    stratify: str | bool = False,
+    replicates: int | None = None,
+) -> int:
+    """Return the number of model runs of a design.
+
+    Parameters
+    ----------
+    inputs : Inputs
+    n : int
+    sampler, stratify, replicates
+        As in `design`.
+
+    Returns
+    -------
+    int
+    """
+    share, parts, levels = _plan(inputs, n, sampler, stratify, replicates)
+    strata = 1 if levels is None else levels.sizes[levels.attrs["dim"]]
+    return share * parts * strata
+
+
+def _plan(
+    inputs: Inputs, n: int, sampler: str, stratify: str | bool, replicates: int | None
+) -> tuple[int, int, xr.Dataset | None]:
+    """Return samples for each replicate, replicates, and the levels of the strata."""
+    if sampler not in SAMPLERS:
+        raise unknown_name("sampler", sampler, SAMPLERS)
+    n = check_count("n", n)
+    parts = REPLICATES[sampler] if replicates is None else check_count("replicates", replicates)
+    if n % parts:
+        raise InputError(f"n is {n}: it must be a multiple of the {parts} replicates")
+    name, _ = _stratum(inputs, stratify)
+    return n // parts, parts, inputs.levels(name) if name else None
+
+
+def _stratum(inputs: Inputs, stratify: str | bool) -> tuple[str, Inputs]:
+    """Return the name of the input that makes the strata, empty without one, and the other inputs."""
+    if stratify is False:
+        return "", inputs
+    if stratify is True:
+        if len(inputs.discrete) != 1:
+            raise InputError(
+                f"stratify is True, but the discrete inputs are {inputs.discrete or 'none'}: name one"
+            )
+        stratify = inputs.discrete[0]
+    if stratify not in inputs.discrete:
+        raise unknown_name("discrete input to stratify", stratify, inputs.discrete)
+    return stratify, inputs.without(stratify)
+
+
+def estimate(
+    outcomes: xr.Dataset, inputs: Inputs, *, of: str, rng: Seed = None, confidence: float = 0.95
+) -> xr.Dataset:
+    """Estimate the probability that an outcome is true, or its mean and variance.
+
+    A variable of role ``"verdict"``, a boolean one, and one without units and role that holds
+    nothing but 0, 1 and NaN gives probabilities with a Wilson interval; one of role
+    ``"probability"`` their mean with a t interval; any other mean and variance. With replicates the
+    interval is that between replicates; where they do not differ, that of the pooled sample.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+        As from `evaluate`, or any Dataset with the variable over ``sample``.
+    inputs : Inputs
+        The inputs of the design; their levels label the strata.
+    of : str
+        Name of the outcome.
+    rng : int or Generator, optional
+        Not used: nothing here is random.
+    confidence : float, default 0.95
+        Level of the intervals.
+
+    Returns
+    -------
+    Dataset
+        ``probability`` with ``_low`` and ``_high`` (interval, every unknown counted as 0 in the
+        one and as 1 in the other), or ``mean`` with ``_low`` and ``_high`` and ``variance``; by level
+        in a stratified analysis, then also ``probability_overall``, weighted, and for each group
+        of levels ``probability_mean``, ``_min``, ``_max`` and ``probability_weighted``.
+
+    Raises
+    ------
+    InputError
+        If the outcome has infinite values or the confidence is not one.
+    """
+    confidence = check_confidence(confidence)
+    values = schema.check_outcomes(outcomes, of)
+    kind = kind_of(values)
+    levels, level = levels_of(outcomes, inputs)
+    strata = 1 if levels is None else levels.sizes[levels.attrs["dim"]]
+    replicates, replicate = _replicates(outcomes)
+    cells = moments(values, level * replicates + replicate, strata * replicates)
+    limits = _limits(cells.reshaped(strata, replicates), kind, confidence)
+    dims = ([] if levels is None else [levels.attrs["dim"]]) + [str(d) for d in values.dims[1:]]
+    pooled = cells.reshaped(strata, replicates).pooled()
+    columns = [*limits, pooled.known, pooled.variance]
+    arrays = [xr.DataArray(column if levels is not None else column[0], dims=dims) for column in columns]
+    results = labelled(values, kind, arrays)
+    if levels is not None:
+        results = with_summaries(results, levels, kind.quantity)
+    return finished(results, outcomes, inputs, of=of, method="monte_carlo", confidence=confidence)
+
+
+def _replicates(outcomes: xr.Dataset) -> tuple[int, NDArray[np.intp]]:
+    """Return the number of replicates and the number of each sample's, from 0."""
+    if "replicate" not in outcomes.coords:
+        return 1, np.zeros(outcomes.sizes["sample"], np.intp)
+    names, replicate = np.unique(outcomes["replicate"].values, return_inverse=True)
+    return len(names), replicate.astype(np.intp)
+
+
+def _limits(cells: Moments, kind: Kind, confidence: float) -> tuple[Array, Array, Array]:
+    """Return estimate, lower and upper limit by stratum from moments (strata, replicates, ...)."""
+    pooled = cells.pooled()
+    if kind.bounded:
+        worst, best = cells.with_unknown(0.0), cells.with_unknown(1.0)
+    else:
+        worst = best = cells
+    low, high = _limit(worst, kind, confidence)[0], _limit(best, kind, confidence)[1]
+    if kind.bounded:
+        low, high = np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
+    return pooled.mean, low, high
+
+
+def _limit(cells: Moments, kind: Kind, confidence: float) -> tuple[Array, Array]:
+    """Return the limits between replicates, or those of the pooled draws where replicates agree."""
+    pooled = cells.pooled()
+    if kind.quantity == "probability" and not kind.graded:
+        single = wilson(pooled.total, pooled.known, confidence)
+    else:
+        single = student(pooled.mean, pooled.squares, pooled.known, confidence)
+    replicates = cells.known.shape[1]
+    if replicates == 1:
+        return single
+    mean = cells.mean.mean(axis=1)
+    squares = np.square(cells.mean - mean[:, None]).sum(axis=1)
+    between = student(mean, squares, np.full_like(mean, replicates), confidence)
+    agree = squares == 0
+    low, high = (np.where(agree, a, b) for a, b in zip(single, between, strict=True))
+    return low, high

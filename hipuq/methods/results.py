@@ -1,0 +1,195 @@
+"""From arrays to labelled results: what an outcome is, its strata, names, summaries, attributes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from hipuq import schema
+from hipuq.errors import SchemaError
+from hipuq.inputs import Inputs
+from hipuq.methods.intervals import combined
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What an outcome is to an estimator.
+
+    Attributes
+    ----------
+    quantity : str
+        ``"probability"`` or ``"mean"``.
+    graded : bool
+        Whether values between 0 and 1 occur: probabilities themselves.
+    """
+
+    quantity: str
+    graded: bool = False
+
+    @property
+    def bounded(self) -> bool:
+        """Whether values lie between 0 and 1, so that an unknown one has bounds."""
+        return self.quantity == "probability"
+
+
+def kind_of(values: xr.DataArray) -> Kind:
+    """Say what an outcome is: by its role, its type, or, if it says nothing of itself, its values."""
+    role = values.attrs.get("role")
+    if role == schema.VERDICT or values.dtype.kind == "b":
+        return Kind("probability")
+    if role == schema.PROBABILITY:
+        return Kind("probability", graded=True)
+    if role is None and "units" not in values.attrs:
+        numbers = values.values.astype(np.float64)
+        if np.isin(numbers[~np.isnan(numbers)], (0.0, 1.0)).all():
+            return Kind("probability")
+    return Kind("mean")
+
+
+def levels_of(outcomes: xr.Dataset, inputs: Inputs) -> tuple[xr.Dataset | None, NDArray[np.intp]]:
+    """Return the levels that outcomes of a stratified design are of, and the one of each sample.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+        Stratified if it has the coord ``weight`` and that of the levels' dim.
+    inputs : Inputs
+
+    Returns
+    -------
+    levels : Dataset or None
+        None if the design was not stratified.
+    level : (samples,) array of int
+        Place of each sample's level, from 0.
+    """
+    if "weight" in outcomes.coords:
+        for name in inputs.discrete:
+            levels = inputs.levels(name)
+            dim = levels.attrs["dim"]
+            if dim in outcomes.coords:
+                place = levels.get_index(dim).get_indexer(outcomes[dim].values)
+                if (place < 0).any():
+                    raise SchemaError(f"the outcomes hold a {dim} that the inputs do not have")
+                return levels, np.asarray(place, np.intp)
+    return None, np.zeros(outcomes.sizes["sample"], np.intp)
+
+
+def labelled(values: xr.DataArray, kind: Kind, arrays: Sequence[xr.DataArray]) -> xr.Dataset:
+    """Return estimate, limits, known counts and, for a mean, the variance as a Dataset.
+
+    Parameters
+    ----------
+    values : DataArray
+        The outcome, for its name, unit and coords.
+    kind : Kind
+    arrays : sequence of DataArray
+        Estimate, lower limit, upper limit, known samples, variance.
+
+    Returns
+    -------
+    Dataset
+    """
+    name = str(values.attrs.get("long_name", values.name))
+    units = "1" if kind.bounded else str(values.attrs.get("units", ""))
+    what = f"probability: {name}" if kind.bounded else f"mean of {name}"
+    keys = [kind.quantity, f"{kind.quantity}_low", f"{kind.quantity}_high", "known"]
+    texts = [what, f"{what}, lower limit", f"{what}, upper limit", "samples with a known outcome"]
+    results = xr.Dataset()
+    for key, text, array in zip(keys, texts, arrays, strict=False):
+        unit = "1" if key == "known" else units
+        results[key] = array.assign_attrs(long_name=text, units=unit)
+    if not kind.bounded:
+        square = f"({units})^2" if units else ""
+        results["variance"] = arrays[4].assign_attrs(long_name=f"variance of {name}", units=square)
+    kept = {
+        key: coord
+        for key, coord in values.coords.items()
+        if coord.dims and "sample" not in coord.dims and set(coord.dims) <= set(results.dims)
+    }
+    return results.assign_coords(kept)
+
+
+def with_summaries(results: xr.Dataset, levels: xr.Dataset, quantity: str) -> xr.Dataset:
+    """Add what is summed up over levels: overall by weight, and for each group of levels.
+
+    Parameters
+    ----------
+    results : Dataset
+        Estimates by level.
+    levels : Dataset
+        With attributes ``dim``, ``group`` (a coord) and ``group_dim``.
+    quantity : str
+        ``"probability"`` or ``"mean"``.
+
+    Returns
+    -------
+    Dataset
+        With ``<quantity>_overall``, ``_low``, ``_high``; over the group dim ``<quantity>_mean`` with
+        ``_low``, ``_high``, ``_min``, ``_max`` over the levels as they are, and
+        ``<quantity>_weighted`` by their weights.
+    """
+    dim, group, group_dim = (levels.attrs[key] for key in ("dim", "group", "group_dim"))
+    labels = levels.drop_vars("weight")
+    results = results.assign_coords(labels.variables).assign(weight=levels["weight"])
+    triple = [results[quantity + end] for end in ("", "_low", "_high")]
+    what, units = triple[0].attrs["long_name"], triple[0].attrs["units"]
+    ends = {"": "", "_low": ", lower limit", "_high": ", upper limit"}
+
+    def put(key: str, value: xr.DataArray, text: str) -> None:
+        results[key] = value.drop_attrs().assign_attrs(long_name=text, units=units)
+
+    overall = combined(triple, results["weight"], dim)
+    for (end, text), value in zip(ends.items(), overall, strict=True):
+        put(f"{quantity}_overall{end}", value, f"{what}, weighted over all levels{text}")
+    names = np.unique(levels[group].values)
+    places = [results[group].values == name for name in names]
+    index = xr.DataArray(names, dims=group_dim, attrs=schema.COORDINATES[group_dim].attrs)
+
+    def by_group(parts: list[xr.DataArray]) -> xr.DataArray:
+        return xr.concat(parts, dim=xr.Variable(group_dim, names), coords="minimal", join="exact")
+
+    plain = [
+        combined([part.isel({dim: place}) for part in triple], xr.ones_like(results["weight"][place]), dim)
+        for place in places
+    ]
+    for i, (end, text) in enumerate(ends.items()):
+        value = by_group([part[i] for part in plain])
+        put(f"{quantity}_mean{end}", value, f"{what}, mean over the levels of a group{text}")
+    weighted = [
+        combined([part.isel({dim: place}) for part in triple], results["weight"][place], dim)[0]
+        for place in places
+    ]
+    put(f"{quantity}_weighted", by_group(weighted), f"{what}, weighted mean over a group")
+    for end in ("min", "max"):
+        value = by_group([getattr(triple[0].isel({dim: place}), end)(dim, skipna=False) for place in places])
+        put(f"{quantity}_{end}", value, f"{what}, {end}imum over the levels of a group")
+    return results.assign_coords({group_dim: index})
+
+
+def finished(
+    results: xr.Dataset, outcomes: xr.Dataset, inputs: Inputs, *, of: str, method: str, confidence: float
+) -> xr.Dataset:
+    """Return results with counts of evaluations, failures and unknowns, seconds and attributes."""
+    status = outcomes["status"].values if "status" in outcomes else np.zeros(outcomes.sizes["sample"])
+    counts = {
+        "evaluations": (outcomes.sizes["sample"], "model evaluations", "1"),
+        "failed": (int((status == schema.STATUS["failed"]).sum()), "failed samples", "1"),
+        "undecided": (int((status == schema.STATUS["undecided"]).sum()), "undecided samples", "1"),
+        "seconds": (float(outcomes.attrs.get("seconds", np.nan)), "time of the evaluations", "s"),
+    }
+    for name, (value, long_name, units) in counts.items():
+        results[name] = ((), value, {"long_name": long_name, "units": units})
+    results = schema.stamp(
+        results.drop_attrs(deep=False),
+        f"estimate {method} of {of}",
+        method=method,
+        inputs=inputs.to_json(),
+        options={"estimate": {"of": of, "confidence": confidence}},
+        like=outcomes.attrs,
+    )
+    results.attrs.pop("seconds", None)
+    return results.assign_attrs(of=of, confidence=confidence)

@@ -1,0 +1,19 @@
+"""Models: each is one file, and one line in `MODELS`.
+
+A model is any callable that takes a samples Dataset and returns a Dataset of outcomes over the same
+samples. The ones here are built from matrices, see :class:`hipuq.models.base.CEAModel`.
+"""
+
+from collections.abc import Callable
+
+from hipuq.models.base import CEAModel, Parameter
+from hipuq.models.mode_coupling import two_dof
+from hipuq.models.oscillator_ring import ring
+
+MODELS: dict[str, Callable[..., CEAModel]] = {
+    "ring": ring,
+    "two_dof": two_dof,
+}
+"""Name of a model -> function that builds it from a preset and options."""
+
+__all__ = ["MODELS", "CEAModel", "Parameter", "ring", "two_dof"]

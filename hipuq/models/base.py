@@ -1,0 +1,329 @@
+"""What the models built from matrices share: samples in, matrices, kernel, outcomes out."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from hipuq import schema
+from hipuq.cea import Pencils, Spectra, mode_shapes, solve
+from hipuq.errors import InputError, SchemaError, unknown_name
+from hipuq.inputs import Inputs, Nominal
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a model: its nominal value and the values that it may take.
+
+    Attributes
+    ----------
+    nominal : (size,) array or float
+        Nominal value; a number for a parameter without an element dim.
+    minimum : float
+        Smallest value allowed.
+    open : bool
+        Whether the minimum itself is excluded.
+    integer : bool
+        Whether only 0 and 1 are allowed.
+    """
+
+    nominal: Array
+    minimum: float = -np.inf
+    open: bool = False
+    boolean: bool = False
+
+    def check(self, name: str, values: Array) -> None:
+        """Raise an InputError if any of the values, sample first, is not allowed."""
+        units = schema.PARAMETERS[name].units
+        unit = "" if units == "1" else f" {units}"
+        if self.boolean:
+            bad, rule = ~np.isin(values, (0, 1)), "must be true or false"
+        else:
+            below = values <= self.minimum if self.open else values < self.minimum
+            bad = below | ~np.isfinite(values)
+            rule = "must be a finite number"
+            if np.isfinite(self.minimum):
+                rule += f" {'above' if self.open else 'not below'} {self.minimum:g}{unit}"
+        if bad.any():
+            where = tuple(np.argwhere(bad)[0])
+            place = f"sample {where[0]}" + "".join(f", element {i + 1}" for i in where[1:])
+            raise InputError(f"{name} is {values[where]:g}{unit} in {place}: it {rule}")
+
+
+class CEAModel(ABC):
+    """A parametric set of matrices, solved by complex eigenvalue analysis.
+
+    A subclass gives `name`, `parameters`, `dofs` and `assemble`; all else is here.
+
+    Attributes
+    ----------
+    preset : str
+        The published set of nominal values.
+    growth_threshold : float
+        Growth rate above which a mode counts as unstable [1/s].
+    parameters : mapping
+        Name -> `Parameter`, all known to the schema.
+    outcomes : tuple of str
+        Names of the outcomes that a call can give.
+    """
+
+    name: ClassVar[str]
+    outcomes: ClassVar[tuple[str, ...]] = (*schema.OUTCOMES, "status", "decided_by")
+
+    def __init__(
+        self, preset: str, parameters: Mapping[str, Parameter], growth_threshold: float = 0.0
+    ) -> None:
+        if not (np.isfinite(growth_threshold) and growth_threshold >= 0):
+            raise InputError(
+                f"growth_threshold is {growth_threshold}: it must be a finite number of 1/s, 0 or above"
+            )
+        self.preset = preset
+        self.parameters = dict(parameters)
+        self.growth_threshold = float(growth_threshold)
+        for name, parameter in self.parameters.items():
+            parameter.check(name, parameter.nominal[None])
+
+    @property
+    @abstractmethod
+    def dofs(self) -> int:
+        """Number of degrees of freedom, and so of modes."""
+
+    @abstractmethod
+    def assemble(self, values: Mapping[str, Array]) -> Pencils:
+        """Return the matrices of a batch.
+
+        Parameters
+        ----------
+        values : mapping
+            Every parameter, (s,) or (s, size), in the units of the schema.
+
+        Returns
+        -------
+        Pencils
+        """
+
+    @property
+    def label(self) -> str:
+        """Name and preset, for attributes and titles."""
+        return f"{self.name}({self.preset})"
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The model as JSON-able options: what rebuilds it."""
+        changed = {name: p.nominal.tolist() for name, p in self.parameters.items()}
+        return {
+            "model": self.name,
+            "preset": self.preset,
+            "growth_threshold": self.growth_threshold,
+            "nominal": changed,
+        }
+
+    def inputs(self, **distributions: object) -> Inputs:
+        """Return inputs that know this model's nominal values and lengths.
+
+        Parameters
+        ----------
+        **distributions
+            Parameter name = a distribution, `relative`, `shift` or `ContactPatterns`.
+
+        Returns
+        -------
+        Inputs
+
+        Raises
+        ------
+        UnknownNameError
+            If the model has no such parameter.
+        """
+        nominal = {
+            name: Nominal(parameter.nominal, schema.PARAMETERS[name].dims[1:])
+            for name, parameter in self.parameters.items()
+        }
+        for name in distributions:
+            if name not in nominal:
+                raise unknown_name("parameter", name, nominal)
+        return Inputs.around(distributions, nominal)
+
+    def nominal(self, **changes: ArrayLike) -> xr.Dataset:
+        """Return one sample at the nominal values, with `changes`.
+
+        Parameters
+        ----------
+        **changes
+            Parameter name = value, a number or one for each element. Several samples come from an
+            array with the sample first: one-dimensional for a scalar parameter.
+
+        Returns
+        -------
+        Dataset
+            Over ``sample``, one variable for each parameter changed; valid samples.
+        """
+        samples: dict[str, Any] = {}
+        size = 1
+        arrays = {}
+        for name, value in changes.items():
+            if name not in self.parameters:
+                raise unknown_name("parameter", name, self.parameters)
+            array = np.asarray(value)
+            dims = schema.PARAMETERS[name].dims
+            arrays[name] = array[None] if array.ndim < len(dims) else array
+            size = max(size, len(arrays[name]))
+        for name, array in arrays.items():
+            dims = schema.PARAMETERS[name].dims
+            shape = (size, *array.shape[1:])
+            samples[name] = (dims, np.broadcast_to(array, shape), schema.PARAMETERS[name].attrs)
+        return xr.Dataset(samples, coords={"sample": np.arange(size)})
+
+    def pencils(self, samples: xr.Dataset) -> Pencils:
+        """Return the matrices of the samples; what is not in them takes its nominal value.
+
+        Parameters
+        ----------
+        samples : Dataset
+            Parameters over ``sample``.
+
+        Returns
+        -------
+        Pencils
+
+        Raises
+        ------
+        UnknownNameError
+            If a variable is none of the model's parameters.
+        SchemaError
+            If a shape does not fit.
+        InputError
+            If a value is not allowed.
+        """
+        size = schema.check_samples(samples, self.parameters)
+        values = {
+            name: self._values(name, samples)
+            if name in samples
+            else np.broadcast_to(parameter.nominal, (size, *parameter.nominal.shape))
+            for name, parameter in self.parameters.items()
+        }
+        return self.assemble(values)
+
+    def check(self, samples: xr.Dataset) -> None:
+        """Check all samples at once, so that an error names the sample by its place in the whole.
+
+        Raises
+        ------
+        UnknownNameError, SchemaError, InputError
+            As `pencils`.
+        """
+        schema.check_samples(samples, self.parameters)
+        for name in samples.data_vars:
+            self._values(str(name), samples)
+
+    def _values(self, name: str, samples: xr.Dataset) -> Array:
+        """Return the checked values of a parameter, (s,) or (s, size)."""
+        parameter = self.parameters[name]
+        given = samples[name].transpose("sample", ...)
+        shape = (samples.sizes["sample"], *parameter.nominal.shape)
+        if given.shape != shape:
+            dims = schema.PARAMETERS[name].dims
+            raise SchemaError(f"{name} has the shape {given.shape}: it needs {shape}, dims {dims}")
+        values = np.ascontiguousarray(given.values, dtype=np.float64)
+        parameter.check(name, values)
+        return values
+
+    def __call__(self, samples: xr.Dataset, keep: Iterable[str] | None = None) -> xr.Dataset:
+        """Return the outcomes of the samples.
+
+        Parameters
+        ----------
+        samples : Dataset
+            Parameters over ``sample``.
+        keep : iterable of str, optional
+            Outcomes wanted; all by default. ``status`` and ``decided_by`` always come.
+
+        Returns
+        -------
+        Dataset
+            Over ``sample`` and ``mode``.
+        """
+        spectra = solve(self.pencils(samples), growth_threshold=self.growth_threshold)
+        return self._outcomes(spectra, self.outcomes if keep is None else tuple(keep))
+
+    def _outcomes(self, spectra: Spectra, keep: tuple[str, ...]) -> xr.Dataset:
+        any_unstable = spectra.any_unstable
+        undecided = np.isnan(any_unstable)
+        data: dict[str, Any] = {}
+        for name in keep:
+            if name in schema.OUTCOMES:
+                variable = schema.OUTCOMES[name]
+                values = any_unstable if name == "any_unstable" else getattr(spectra, name)
+                data[name] = (variable.dims, values, variable.attrs)
+            elif name not in ("status", "decided_by"):
+                raise unknown_name("outcome", name, self.outcomes)
+        status = np.where(undecided, schema.STATUS["undecided"], schema.STATUS["ok"]).astype(np.int8)
+        decided = np.where(undecided, -1, schema.DECIDED_BY["double"]).astype(np.int8)
+        data["status"] = ("sample", status, schema.flag_attrs("status of the sample", schema.STATUS))
+        data["decided_by"] = (
+            "sample",
+            decided,
+            schema.flag_attrs("what decided the verdict", schema.DECIDED_BY),
+        )
+        coords = {}
+        if any("mode" in value[0] for value in data.values()):
+            coords = self.mode_coordinates()
+        return xr.Dataset(data, coords=coords)
+
+    def mode_coordinates(self) -> dict[str, Any]:
+        """Return the coordinate ``mode`` and the pair that each mode closes by flutter.
+
+        The growing mode of a coalesced pair (i, i + 1) is i + 1, so flutter of mode j is always
+        that of the pair (j - 1, j).
+        """
+        pairs = ["1", *(f"{j - 1}-{j}" for j in range(2, self.dofs + 1))]
+        return {
+            "mode": schema.index("mode", self.dofs),
+            "pair": ("mode", pairs, {"long_name": "pair of modes that coalesces", "units": "1"}),
+        }
+
+    def mode_shapes(self, sample: xr.Dataset) -> xr.Dataset:
+        """Return the mode shapes and energies of one sample.
+
+        Parameters
+        ----------
+        sample : Dataset
+            One sample, as from `nominal`.
+
+        Returns
+        -------
+        Dataset
+            ``shape_real``, ``shape_imag`` over (mode, dof), normalised to unit modal mass with the
+            largest entry real and positive; ``frequency``, ``growth_rate``, ``strain_energy``,
+            ``kinetic_energy``, ``friction_work``, ``damping_work`` over mode.
+        """
+        shapes = mode_shapes(self.pencils(sample))
+        energy = {
+            "strain_energy": "mean strain energy over a cycle",
+            "kinetic_energy": "mean kinetic energy over a cycle",
+            "friction_work": "work of friction in a cycle",
+            "damping_work": "work of damping in a cycle",
+        }
+        shape_attrs = {"units": "kg^-1/2", "normalization": "unit modal mass, largest entry real"}
+        data: dict[str, Any] = {
+            "frequency": ("mode", shapes.eigenvalue.imag / (2 * np.pi), schema.OUTCOMES["frequency"].attrs),
+            "growth_rate": ("mode", shapes.eigenvalue.real, schema.OUTCOMES["growth_rate"].attrs),
+        }
+        for part in ("real", "imag"):
+            attrs = {"long_name": f"mode shape, {part} part", **shape_attrs}
+            data[f"shape_{part}"] = (("mode", "dof"), getattr(shapes.shape, part), attrs)
+        for name, long_name in energy.items():
+            data[name] = ("mode", getattr(shapes, name), {"long_name": long_name, "units": "J"})
+        dof = ("dof", np.arange(1, self.dofs + 1), {"long_name": "degree of freedom", "units": "1"})
+        return xr.Dataset(data, coords={**self.mode_coordinates(), "dof": dof})
+
+    def __repr__(self) -> str:
+        return f"<hipuq model {self.label}: {self.dofs} modes, parameters {', '.join(self.parameters)}>"

@@ -1,0 +1,1 @@
+"""Figures: one function each, Dataset in, matplotlib Axes out."""

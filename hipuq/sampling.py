@@ -1,0 +1,130 @@
+"""Points in the unit cube, by rows: the same rows whatever the slices they are asked for in."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hipuq.errors import InputError, unknown_name
+
+Array = NDArray[np.float64]
+Seed = int | np.integer | np.random.Generator | np.random.SeedSequence | None
+
+BLOCK = 4096
+"""Rows that share a key of the random sampler; designs are made in blocks of this size."""
+
+LATIN_HYPERCUBE_MAXIMUM = 2**22
+"""Largest latin hypercube, which has to be made whole."""
+
+SAMPLERS = ("random", "latin_hypercube", "sobol")
+
+
+def seed_of(rng: Seed) -> int:
+    """Return the one integer that a design is made from.
+
+    Parameters
+    ----------
+    rng : int, Generator, SeedSequence or None
+        An integer from 0 to 2**63 - 1 is the seed itself. A Generator gives one draw, so that two
+        designs from one Generator differ. None asks the operating system.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    InputError
+        For anything else.
+    """
+    if rng is None:
+        rng = np.random.SeedSequence()
+    if isinstance(rng, np.random.SeedSequence):
+        rng = np.random.default_rng(rng)
+    if isinstance(rng, np.random.Generator):
+        return int(rng.integers(0, 2**63, dtype=np.uint64))
+    if isinstance(rng, (int, np.integer)) and not isinstance(rng, bool) and 0 <= rng < 2**63:
+        return int(rng)
+    raise InputError(f"rng is {rng!r}: it must be an integer from 0 to 2**63 - 1 or a numpy Generator")
+
+
+def spawn(seed: int, *key: int) -> np.random.Generator:
+    """Return the Generator that belongs to a key, independent of those of all other keys."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
+
+
+def check_count(name: str, value: object, minimum: int = 1) -> int:
+    """Return a number of samples, draws or replicates as int.
+
+    Raises
+    ------
+    InputError
+        If it is not an integer of at least `minimum`.
+    """
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= minimum:
+        return int(value)
+    raise InputError(f"{name} is {value!r}: it must be an integer of {minimum} or more")
+
+
+def unit_points(sampler: str, n: int, dimension: int, seed: int, key: tuple[int, ...], rows: slice) -> Array:
+    """Return rows of a design of n points in the unit cube.
+
+    Parameters
+    ----------
+    sampler : str
+        ``"random"``, ``"latin_hypercube"`` or ``"sobol"`` (Owen scrambled).
+    n : int
+        Number of points of the whole design; a power of 2 for ``"sobol"``.
+    dimension : int
+        Number of columns.
+    seed : int
+        Seed of the design.
+    key : tuple of int
+        Which design of this seed: level and replicate.
+    rows : slice
+        Start and stop, both given.
+
+    Returns
+    -------
+    (rows, dimension) array
+        In [0, 1).
+
+    Raises
+    ------
+    InputError
+        If n does not suit the sampler.
+    """
+    if sampler == "random":
+        return _random(dimension, seed, key, rows)
+    from scipy.stats import qmc
+
+    rng = spawn(seed, *key)
+    if sampler == "latin_hypercube":
+        if n > LATIN_HYPERCUBE_MAXIMUM:
+            raise InputError(
+                f"a latin hypercube of {n} points has to be made whole: at most "
+                f"{LATIN_HYPERCUBE_MAXIMUM}; take sampler 'random' or 'sobol'"
+            )
+        return np.asarray(qmc.LatinHypercube(dimension, rng=rng).random(n))[rows]
+    if sampler == "sobol":
+        if n & (n - 1):
+            below = 1 << (n.bit_length() - 1)
+            raise InputError(
+                f"a Sobol design of {n} points is not balanced: take a power of 2, {below} or {2 * below}"
+            )
+        sequence = qmc.Sobol(dimension, scramble=True, rng=rng)
+        if rows.start:
+            sequence.fast_forward(rows.start)
+        return np.asarray(sequence.random(rows.stop - rows.start))
+    raise unknown_name("sampler", sampler, SAMPLERS)
+
+
+def _random(dimension: int, seed: int, key: tuple[int, ...], rows: slice) -> Array:
+    points = np.empty((rows.stop - rows.start, dimension))
+    for block in range(rows.start // BLOCK, -(-rows.stop // BLOCK)):
+        first = block * BLOCK
+        stop = min(rows.stop, first + BLOCK)
+        drawn = spawn(seed, *key, block).random((stop - first, dimension))
+        begin = max(rows.start, first)
+        points[begin - rows.start : stop - rows.start] = drawn[begin - first :]
+    return points
