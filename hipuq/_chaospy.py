@@ -49,7 +49,8 @@ def support(distribution: Any) -> tuple[float, float]:
     """Return the lower and upper end of a one-dimensional distribution."""
     lower, upper = float(distribution.lower[0]), float(distribution.upper[0])
     if distribution.interpret_as_integer:
-        return lower + 0.5, upper - 0.5
+        # The ends lie half a level, give or take rounding, outside the levels.
+        return float(round(lower + 0.5)), float(round(upper - 0.5))
     return lower, upper
 
 
@@ -58,7 +59,7 @@ def ppf(distribution: Any, u: Array) -> Array:
     if distribution.interpret_as_integer:
         lower, upper = support(distribution)
         levels = np.arange(lower, upper + 1)
-        cumulative = np.asarray(distribution.cdf(levels + 0.5), dtype=np.float64)
+        cumulative = np.asarray(distribution.cdf(levels), dtype=np.float64)
         cumulative[-1] = 1.0
         found: Array = levels[np.searchsorted(cumulative, u, side="left").clip(0, len(levels) - 1)]
         return found
@@ -68,7 +69,7 @@ def ppf(distribution: Any, u: Array) -> Array:
 
 def cdf(distribution: Any, x: Array) -> Array:
     """Return the cumulative probability at `x`, any shape."""
-    at = np.floor(x) + 0.5 if distribution.interpret_as_integer else x
+    at = np.floor(x) if distribution.interpret_as_integer else x
     flat = np.asarray(distribution.cdf(np.ravel(at)), dtype=np.float64)
     return flat.reshape(np.shape(x))
 

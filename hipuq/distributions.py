@@ -86,16 +86,20 @@ def as_distribution(value: object, name: str = "distribution") -> Distribution:
     """
     if isinstance(value, Distribution):
         return value
-    if _chaospy.is_distribution(value):
-        found = _from_chaospy(value, name)
-    elif callable(getattr(value, "ppf", None)):
-        found = _from_ppf(value)
-    else:
-        raise InputError(
-            f"{name} is {value!r}: it must be a chaospy distribution, a frozen scipy one, "
-            "or an object with ppf"
-        )
-    _check_quantiles(found, name)
+    try:
+        if _chaospy.is_distribution(value):
+            found = _from_chaospy(value, name)
+        elif callable(getattr(value, "ppf", None)):
+            found = _from_ppf(value)
+        else:
+            raise InputError(
+                f"{name} is {value!r}: it must be a chaospy distribution, a frozen scipy one, "
+                "or an object with ppf"
+            )
+        _check_quantiles(found, name)
+    except AssertionError as error:
+        # chaospy checks its arguments by assert, some of them on first use only.
+        raise InputError(f"{name} is {value!r}, which cannot be used: {error}") from error
     return found
 
 
@@ -181,8 +185,66 @@ def _scipy_frozen(description: Mapping[str, Any]) -> Any:
 
 def _check_quantiles(distribution: Distribution, name: str) -> None:
     """Raise an InputError unless quantiles are finite numbers that do not fall."""
+    lower, upper = distribution.support
+    if not lower <= upper:
+        raise InputError(f"{name} has the support {lower:g} to {upper:g}: check its arguments")
     quantiles = np.asarray(distribution.ppf(_PROBES), dtype=np.float64)
     if quantiles.shape != _PROBES.shape or not np.isfinite(quantiles).all():
         raise InputError(f"{name} gives quantiles that are not finite numbers: check its arguments")
     if (np.diff(quantiles) < 0).any():
         raise InputError(f"{name} gives quantiles that fall: its ppf must not decrease")
+
+
+FAMILIES: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
+    "uniform": ("Uniform", ("lower", "upper"), ()),
+    "normal": ("Normal", ("mu", "sigma"), ()),
+    "truncated_normal": ("TruncNormal", ("lower", "upper", "mu", "sigma"), ()),
+    "lognormal": ("LogNormal", ("mu", "sigma"), ("shift", "scale")),
+    "log_uniform": ("Reciprocal", ("lower", "upper"), ()),
+    "triangle": ("Triangle", ("lower", "midpoint", "upper"), ()),
+    "beta": ("Beta", ("alpha", "beta"), ("lower", "upper")),
+    "pert": ("PERT", ("lower", "mode", "upper"), ("gamma",)),
+    "gamma": ("Gamma", ("shape", "scale"), ("shift",)),
+    "exponential": ("Exponential", ("scale",), ("shift",)),
+    "weibull": ("Weibull", ("shape", "scale"), ("shift",)),
+    "discrete_uniform": ("DiscreteUniform", ("lower", "upper"), ()),
+    "binomial": ("Binomial", ("size", "prob"), ()),
+}
+"""Name in study files -> chaospy's name, the parameters that must and those that may be given."""
+
+
+def from_family(family: str, parameters: Mapping[str, Any]) -> Distribution:
+    """Return a distribution by the name and parameters used in study files.
+
+    Parameters
+    ----------
+    family : str
+        One of `FAMILIES`.
+    parameters : mapping
+        Its parameters, those of chaospy's distribution.
+
+    Returns
+    -------
+    Distribution
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such family or parameter.
+    InputError
+        If a parameter is missing or not a finite number.
+    """
+    if family not in FAMILIES:
+        raise unknown_name("distribution", family, FAMILIES)
+    name, required, optional = FAMILIES[family]
+    allowed = required + optional
+    for key in required:
+        if key not in parameters:
+            raise InputError(f"the distribution {family!r} needs {', '.join(required)}: {key} is missing")
+    for key, value in parameters.items():
+        if key not in allowed:
+            raise unknown_name(f"parameter of the distribution {family!r}", key, allowed)
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+            raise InputError(f"{key} of the distribution {family!r} is {value!r}: it must be a finite number")
+    made = _chaospy.from_dict({"name": name, "kwargs": dict(parameters)})
+    return as_distribution(made, f"distribution {family!r}")

@@ -95,10 +95,11 @@ def _eigenpairs(pencils: Pencils) -> tuple[Complex, Complex]:
     stiffness, damping = pencils.reduced()
     n = stiffness.shape[1]
     if damping is None or not damping.any():
-        squares, vectors = np.linalg.eig(stiffness[0])
+        squares, right = np.linalg.eig(stiffness[0])
+        vectors = right.astype(np.complex128)
         root = np.sqrt(squares.astype(np.complex128))
         # Of the two roots +-l of a divergent mode the growing one stands for it.
-        values = np.where(squares.imag == 0, root.imag + 1j * root.real, 1j * root)
+        values = np.where(squares.imag == 0, root.imag + 1j * root.real, 1j * root).astype(np.complex128)
     else:
         rate = np.sqrt(np.linalg.norm(stiffness[0]))
         states = np.block(
@@ -107,19 +108,17 @@ def _eigenpairs(pencils: Pencils) -> tuple[Complex, Complex]:
                 [-stiffness[0] / rate**2, -damping[0] / rate],
             ]
         )
-        roots, vectors = np.linalg.eig(states)
-        values = roots.astype(np.complex128) * rate
+        roots, right = np.linalg.eig(states)
+        values = (roots * rate).astype(np.complex128)
         keep = np.lexsort((-values.real, -np.sign(values.imag)))[:n]
-        values, vectors = values[keep], vectors[:n, keep]
+        values, vectors = values[keep], right[:n, keep].astype(np.complex128)
     values[np.argsort(np.abs(values), kind="stable")[: pencils.mechanisms[0]]] = 0.0
     order = np.lexsort((values.real, values.imag))
-    values, vectors = values[order], vectors[:, order].astype(np.complex128)
-    return values, _unreduced(pencils.mass[0], vectors)
+    return values[order], _unreduced(pencils.mass[0], vectors[:, order])
 
 
 def _unreduced(mass: Array, vectors: Complex) -> Complex:
     """Return the vectors in the degrees of freedom of the pencil: ``L^-T z`` with ``M = L L^T``."""
     if mass.ndim == 1:
         return vectors / np.sqrt(mass)[:, None]
-    back: Complex = np.linalg.solve(np.linalg.cholesky(mass).T, vectors)
-    return back
+    return np.linalg.solve(np.linalg.cholesky(mass).T, vectors).astype(np.complex128)

@@ -110,8 +110,8 @@ def _apart(values: Complex, radius: Array, rigid: Mask) -> Mask:
     diagonal = np.arange(values.shape[1])
     distance[:, diagonal, diagonal] = np.inf
     np.copyto(distance, np.inf, where=rigid[:, None, :])
-    clear: Mask = (distance > np.square(radius[:, :, None] + radius[:, None, :])).all(axis=2)
-    return clear
+    reach = np.square(radius[:, :, None] + radius[:, None, :])
+    return np.asarray((distance > reach).all(axis=2), dtype=np.bool_)
 
 
 def _gap_margin(values: Complex, rigid: Mask, mean: Array) -> Array:

@@ -6,6 +6,7 @@ samples. The ones here are built from matrices, see :class:`hipuq.models.base.CE
 
 from collections.abc import Callable
 
+from hipuq.models import mode_coupling, oscillator_ring
 from hipuq.models.base import CEAModel, Parameter
 from hipuq.models.mode_coupling import two_dof
 from hipuq.models.oscillator_ring import ring
@@ -16,4 +17,10 @@ MODELS: dict[str, Callable[..., CEAModel]] = {
 }
 """Name of a model -> function that builds it from a preset and options."""
 
-__all__ = ["MODELS", "CEAModel", "Parameter", "ring", "two_dof"]
+PRESETS: dict[str, list[str]] = {
+    "ring": list(oscillator_ring.PRESETS),
+    "two_dof": list(mode_coupling.PRESETS),
+}
+"""Name of a model -> its presets."""
+
+__all__ = ["MODELS", "PRESETS", "CEAModel", "Parameter", "ring", "two_dof"]

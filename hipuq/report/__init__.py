@@ -1,1 +1,1 @@
-"""The report of a study, from its results alone."""
+"""The report of a study, from its results alone: tables, text, figures, page."""

@@ -1,0 +1,126 @@
+"""The command line: run a study, show and report its results, list what there is."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(
+    name="hipuq",
+    help="Uncertainty quantification of friction-induced instability of hip implants.",
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+
+_DEBUG = False
+
+
+@app.callback()
+def _common(
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+) -> None:
+    global _DEBUG
+    _DEBUG = debug
+
+
+@app.command()
+def run(
+    study: Annotated[Path, typer.Argument(help="Study folder or its study.toml.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Output folder; default results/<study> here.")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option("--jobs", help="Threads; default all cores.")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed in place of the study's.")] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check the study and count evaluations, nothing else.")
+    ] = False,
+) -> None:
+    """Run a study: outcomes, results.nc, figures and report.html."""
+    from hipuq.sampling import check_count
+    from hipuq.study import load_study, run_study
+
+    if jobs is not None:
+        check_count("--jobs", jobs)
+    plan = load_study(study, seed=seed)
+    typer.echo(f"{plan.title}\nseed {plan.seed}")
+    for analysis in plan.analyses:
+        typer.echo(
+            f"  {analysis.name}: {analysis.method} of {', '.join(analysis.of)} with "
+            f"{analysis.model.label}, {analysis.evaluations:,} evaluations"
+        )
+    typer.echo(f"  in all {sum(analysis.evaluations for analysis in plan.analyses):,} evaluations")
+    if dry_run:
+        return
+    folder = out if out is not None else Path("results") / plan.name
+    tree = run_study(plan, folder, n_jobs=jobs, say=typer.echo)
+    from hipuq.report.page import write_report
+
+    page = write_report(tree, folder)
+    typer.echo(f"results: {folder / 'results.nc'}\nreport: {page}")
+
+
+@app.command()
+def report(results: Annotated[Path, typer.Argument(help="Output folder or its results.nc.")]) -> None:
+    """Write figures and report again, from stored results."""
+    from hipuq.report.page import write_report
+    from hipuq.store import load_results
+
+    tree = load_results(results)
+    typer.echo(f"report: {write_report(tree, results if results.is_dir() else results.parent)}")
+
+
+@app.command()
+def show(results: Annotated[Path, typer.Argument(help="Output folder or its results.nc.")]) -> None:
+    """Show results in one screen of text."""
+    from hipuq.report.text import show_results
+    from hipuq.store import load_results
+
+    show_results(load_results(results))
+
+
+@app.command("list")
+def list_(what: Annotated[str, typer.Argument(help="models or methods")]) -> None:
+    """List models with their presets, or methods with their options."""
+    from hipuq.errors import unknown_name
+
+    if what == "models":
+        from hipuq.models import MODELS, PRESETS
+
+        for name in MODELS:
+            typer.echo(f"{name}: presets {', '.join(PRESETS[name])}")
+    elif what == "methods":
+        from hipuq.methods import METHODS
+
+        for name, method in METHODS.items():
+            options = {**method.options("design"), **method.options("estimate")}
+            text = ", ".join(f"{key}={value!r}" for key, value in options.items())
+            typer.echo(f"{name}: {method.title}; options {text}")
+    else:
+        raise unknown_name("list", what, ["models", "methods"])
+
+
+def main() -> None:
+    """Run the command line; an error is one line and a non-zero exit code."""
+    from hipuq.errors import HipuqError
+
+    try:
+        app()
+    except HipuqError as error:
+        if _DEBUG:
+            raise
+        _fail(str(error))
+    except KeyboardInterrupt:
+        _fail("interrupted", 130)
+    except Exception as error:
+        if _DEBUG:
+            raise
+        _fail(f"unexpected {type(error).__name__}: {error}; hipuq --debug shows where")
+
+
+def _fail(message: str, code: int = 1) -> None:
+    print(f"hipuq: {' '.join(message.split())}", file=sys.stderr)
+    raise SystemExit(code)

@@ -1,0 +1,215 @@
+"""How often each mode is unstable, over the contact patterns of a number in contact.
+
+Figure 3 of Oberst et al., INTER-NOISE 2016, p. 5539.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+from numpy.typing import NDArray
+
+from hipuq.errors import InputError, SchemaError
+from hipuq.plots.style import BLACK, BLUE, VERMILLION, axis_label, new_axes, new_panels
+
+NEEDED = ("probability_min", "probability_mean", "probability_max")
+LAST = 8
+"""Modes shown by default: the last ones, among which flutter occurs."""
+
+
+def occurrence(
+    results: xr.Dataset,
+    count: int,
+    *,
+    ax: Axes | None = None,
+    modes: Sequence[int] | None = None,
+    names: Mapping[int, str] | None = None,
+) -> Axes:
+    """Draw minimum, mean and maximum over patterns of the probability that a mode is unstable.
+
+    Parameters
+    ----------
+    results : Dataset
+        Of a stratified analysis of ``unstable``: ``probability_min``, ``_mean``, ``_max`` over
+        (count, mode), and if there are any the limits ``probability_mean_low``, ``_high``. Where all
+        patterns agree, as a single one does, the mean stands alone.
+    count : int
+        Number of oscillators in contact.
+    ax : Axes, optional
+        Where to draw; a new figure by default.
+    modes : sequence of int, optional
+        Modes to show; the last eight by default. A growing mode takes the upper number of its pair,
+        but which pairs coalesce depends on the pattern, so odd and even modes both occur.
+    names : mapping, optional
+        Mode number -> name that the source gives it, shown beneath.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    SchemaError
+        If the results are not of this kind.
+    InputError
+        If the count or a mode is not in them.
+    """
+    chosen = _chosen(results, [count], modes)
+    ax = new_axes(ax)
+    _draw(ax, chosen, count, names or {}, _mean_label(results))
+    ax.set_title(_title(results, count))
+    ax.set_xlabel(_mode_label(chosen, names))
+    ax.set_ylabel(_probability_label(results))
+    ax.legend(loc="upper left")
+    return ax
+
+
+def occurrence_panels(
+    results: xr.Dataset,
+    *,
+    figure: FigureBase | None = None,
+    counts: Sequence[int] | None = None,
+    modes: Sequence[int] | None = None,
+    names: Mapping[int, str] | None = None,
+) -> NDArray[np.object_]:
+    """Draw `occurrence` for every number in contact, axes shared.
+
+    Parameters
+    ----------
+    results : Dataset
+        As for `occurrence`.
+    figure : Figure or SubFigure, optional
+        Where to draw; a new figure by default.
+    counts : sequence of int, optional
+        Numbers in contact; all by default.
+    modes, names : optional
+        As for `occurrence`.
+
+    Returns
+    -------
+    (rows, 2) array of Axes
+        One row and one column for a single count. A place left over is an Axes that is not visible.
+    """
+    if counts is None:
+        counts = [int(value) for value in _checked(results)["count"].values]
+    chosen = _chosen(results, counts, modes)
+    columns = min(2, len(counts))
+    rows = -(-len(counts) // columns)
+    size = (4.8 * columns, 2.9 * rows + 0.5)
+    axes = new_panels(figure, rows, columns, size, sharex=True, sharey=True)
+    for i, (ax, count) in enumerate(zip(axes.flat, counts, strict=False)):
+        _draw(ax, chosen, count, names or {}, _mean_label(results))
+        ax.set_title(f"({chr(ord('a') + i)}) {_title(results, count)}")
+    for ax in axes.flat[len(counts) :]:
+        ax.set_visible(False)
+    parent = axes[0, 0].figure
+    parent.supxlabel(_mode_label(chosen, names), fontsize="medium")
+    parent.supylabel(_probability_label(results), fontsize="medium")
+    legend: dict[str, Any] = {}
+    for ax in axes.flat[: len(counts)]:
+        handles, labels = ax.get_legend_handles_labels()
+        legend |= {
+            label: handle for handle, label in zip(handles, labels, strict=True) if label not in legend
+        }
+    parent.legend(legend.values(), legend.keys(), loc="outside upper center", ncols=3, frameon=False)
+    return axes
+
+
+def _checked(results: xr.Dataset) -> xr.Dataset:
+    """Return the results if they are summed up by count and mode."""
+    for name in NEEDED:
+        if name not in results or set(results[name].dims) != {"count", "mode"}:
+            raise SchemaError(
+                f"the figure needs {name!r} over (count, mode): results of 'unstable' in a stratified analysis"
+            )
+    return results
+
+
+def _chosen(results: xr.Dataset, counts: Sequence[int], modes: Sequence[int] | None) -> xr.Dataset:
+    """Return the results of the modes to draw, once counts and modes are known to be there."""
+    results = _checked(results)
+    here = results["mode"].values.tolist()
+    wanted = here[-LAST:] if modes is None else list(modes)
+    for what, values, allowed in (
+        ("count", list(counts), results["count"].values.tolist()),
+        ("mode", wanted, here),
+    ):
+        if not values:
+            raise InputError(f"no {what} to draw: name at least one of {allowed}")
+        for value in values:
+            if value not in allowed:
+                raise InputError(f"{what} {value} is not in the results: it must be one of {allowed}")
+    return results.sel(mode=wanted)
+
+
+def _draw(ax: Axes, chosen: xr.Dataset, count: int, names: Mapping[int, str], mean_label: str) -> None:
+    """Draw one panel on places 0, 1, ... without its labels."""
+    part = {key: 100 * chosen[key].sel(count=count).values for key in NEEDED}
+    low, mean, high = part.values()
+    place = np.arange(len(mean))
+    spread = high > low
+    if spread.any():
+        ax.vlines(place[spread], low[spread], high[spread], color=BLACK, linewidth=0.8)
+        style: dict[str, Any] = {"linestyle": "none", "markersize": 7}
+        ax.plot(place[spread], high[spread], "^", color=VERMILLION, label="maximum", **style)
+        ax.plot(place[spread], low[spread], "v", color=BLUE, label="minimum", **style)
+    error = None
+    if "probability_mean_low" in chosen and "probability_mean_high" in chosen:
+        limits = [100 * chosen[f"probability_mean_{end}"].sel(count=count).values for end in ("low", "high")]
+        error = np.clip([mean - limits[0], limits[1] - mean], 0.0, None)
+    ax.errorbar(
+        place,
+        mean,
+        error,
+        fmt="o",
+        color=BLACK,
+        markerfacecolor="white",
+        markersize=5,
+        capsize=3,
+        elinewidth=2,
+        label=mean_label if error is not None else "mean",
+    )
+    unknown = np.isnan(mean)
+    for x in place[unknown]:
+        ax.annotate("?", (x, 0.02), xycoords=("data", "axes fraction"), ha="center", va="bottom")
+    ax.set_xticks(place, [_tick(chosen, i, names) for i in place])
+    ax.tick_params(axis="x", labelsize="small")
+    ax.set_xlim(-0.6, len(place) - 0.4)
+    ax.set_ylim(-4, 104)
+    ax.grid(axis="y", linewidth=0.4, alpha=0.5)
+
+
+def _tick(chosen: xr.Dataset, place: int, names: Mapping[int, str]) -> str:
+    """Return the tick label of a mode: its pair, or its number, and the name in the source."""
+    mode = int(chosen["mode"].values[place])
+    label = str(chosen["pair"].values[place]) if "pair" in chosen.coords else str(mode)
+    return f"{label}\n({names[mode]})" if mode in names else label
+
+
+def _mode_label(chosen: xr.Dataset, names: Mapping[int, str] | None) -> str:
+    label = "pair of modes, by ascending frequency" if "pair" in chosen.coords else "mode"
+    return f"{label} (mode named in the paper)" if names else label
+
+
+def _probability_label(results: xr.Dataset) -> str:
+    source = results["probability"] if "probability" in results else results["probability_mean"]
+    return axis_label(source, "%")
+
+
+def _mean_label(results: xr.Dataset) -> str:
+    """Return the legend of the mean: with the level of its interval where that is known."""
+    level = results.attrs.get("confidence")
+    return "mean" if level is None else f"mean, {100 * float(level):g} % interval"
+
+
+def _title(results: xr.Dataset, count: int) -> str:
+    title = f"{count} in contact"
+    if "in_contact" in results.coords:
+        patterns = int((results["in_contact"].values == count).sum())
+        title += f", {patterns} pattern{'' if patterns == 1 else 's'}"
+    return title

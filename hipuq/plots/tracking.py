@@ -1,0 +1,151 @@
+"""Modes followed over a friction sweep, and the friction at which they lock in.
+
+A mode number is the rank of its frequency. A coalesced pair passes other modes as friction grows,
+and then all ranks shift, though nothing happens to the pair; so a figure over friction needs modes
+that are followed. They bear the number that they have at the largest friction.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from hipuq import schema
+from hipuq.errors import InputError, SchemaError
+
+Array = NDArray[np.float64]
+
+TRACKED = ("frequency", "growth_rate", "unstable")
+
+
+def follow_modes(outcomes: xr.Dataset) -> xr.Dataset:
+    """Return the modes of a friction sweep, each followed from the largest friction downwards.
+
+    From one friction to the next modes are matched so that their eigenvalues move least in all and,
+    as far as verdicts are known, growing modes stay growing and decaying ones decaying. Samples
+    without frequencies (failed ones) are left out.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+        ``friction`` over sample; ``frequency`` [Hz], ``growth_rate`` [1/s] and ``unstable`` (1, 0,
+        NaN for undecided) over (sample, mode). Nothing but friction may vary.
+
+    Returns
+    -------
+    Dataset
+        The same variables by ascending friction; ``mode`` is the number at the largest friction.
+
+    Raises
+    ------
+    SchemaError
+        If a variable is missing.
+    InputError
+        If another parameter varies, or no sample is left.
+    """
+    sweep = _sorted_sweep(outcomes)
+    frequency, growth, unstable = (sweep[name].values.astype(np.float64) for name in TRACKED)
+    roots = growth + 2j * np.pi * frequency
+    kind = np.where(np.isnan(unstable), np.nan, np.sign(growth))
+    place = np.empty(frequency.shape, np.intp)
+    last = len(place) - 1
+    place[last] = np.arange(frequency.shape[1])
+    for i in range(last, 0, -1):
+        place[i - 1] = _next_places(roots[i, place[i]], kind[i, place[i]], roots[i - 1], kind[i - 1])
+    columns = {
+        name: (("sample", "mode"), np.take_along_axis(sweep[name].values, place, axis=1), sweep[name].attrs)
+        for name in TRACKED
+    }
+    return sweep[["friction"]].assign(columns).assign_coords(mode=sweep["mode"])
+
+
+def lock_in_bracket(outcomes: xr.Dataset, mode: int) -> tuple[float, float]:
+    """Return the frictions between which a mode locks in.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+        A friction sweep, as for `follow_modes`.
+    mode : int
+        Its number at the largest friction: that of the growing mode, the upper of its pair.
+
+    Returns
+    -------
+    low : float
+        Largest friction below `high` at which the mode is known to be stable; NaN if there is none.
+    high : float
+        Smallest friction at which it is known to be unstable. Both are NaN if there is none.
+    """
+    return _bracket(follow_modes(outcomes), mode)
+
+
+def _bracket(sweep: xr.Dataset, mode: int) -> tuple[float, float]:
+    """Return the lock-in bracket of a mode that has been followed."""
+    check_modes(sweep, [mode])
+    friction = sweep["friction"].values
+    verdict = sweep["unstable"].sel(mode=mode).values
+    first = np.flatnonzero(verdict == 1)
+    if first.size == 0:
+        return float("nan"), float("nan")
+    before = np.flatnonzero(verdict[: first[0]] == 0)
+    low = float(friction[before[-1]]) if before.size else float("nan")
+    return low, float(friction[first[0]])
+
+
+def check_modes(sweep: xr.Dataset, modes: list[int]) -> None:
+    """Raise an InputError if a mode is not in the sweep.
+
+    Parameters
+    ----------
+    sweep : Dataset
+        With the coordinate ``mode``.
+    modes : list of int
+        Numbers of modes.
+    """
+    allowed = sweep["mode"].values.tolist()
+    for mode in modes:
+        if mode not in allowed:
+            raise InputError(f"mode {mode} is not in the sweep: it must be one of {allowed}")
+
+
+def _sorted_sweep(outcomes: xr.Dataset) -> xr.Dataset:
+    """Return the checked sweep by ascending friction, without samples that have no frequencies."""
+    for name in ("friction", *TRACKED):
+        if name not in outcomes:
+            raise SchemaError(f"the sweep needs {name!r}: outcomes of a friction sweep, all modes")
+    if outcomes["friction"].dims != ("sample",):
+        raise SchemaError(f"friction needs the dim 'sample' alone, it has {outcomes['friction'].dims}")
+    for name in schema.PARAMETERS:
+        if name != "friction" and name in outcomes and "sample" in outcomes[name].dims:
+            values = outcomes[name].transpose("sample", ...).values
+            if (values != values[:1]).any():
+                raise InputError(f"{name} varies in the outcomes: in a friction sweep only friction may")
+    sweep = outcomes[["friction", *TRACKED]].transpose("sample", ...)
+    if "mode" not in sweep.coords:
+        sweep = sweep.assign_coords(mode=np.arange(1, sweep.sizes["mode"] + 1))
+    complete = np.isfinite(sweep["frequency"].values).all(axis=1)
+    complete &= np.isfinite(sweep["growth_rate"].values).all(axis=1)
+    if not complete.any():
+        raise InputError("no sample of the sweep has frequencies: there is nothing to draw")
+    sweep = sweep.isel(sample=np.flatnonzero(complete))
+    return sweep.isel(sample=np.argsort(sweep["friction"].values, kind="stable"))
+
+
+def _next_places(
+    roots: NDArray[np.complex128], kind: Array, others: NDArray[np.complex128], other_kind: Array
+) -> NDArray[np.intp]:
+    """Return for each root its match among the others.
+
+    `kind` is 1 for growing, -1 for decaying, 0 for neither, NaN for unknown; a known change of it
+    costs more than any move. Of two roots that a pair splits into, the growing one gets the upper:
+    both ways are the same distance.
+    """
+    cost = np.abs(roots[:, None] - others)
+    longest = cost.max()
+    upper = np.nan_to_num(kind)[:, None] * (others.imag - roots.imag[:, None])
+    with np.errstate(invalid="ignore"):
+        changed = np.abs(kind[:, None] - other_kind) > 0
+    match = linear_sum_assignment(cost + longest * changed - 1e-6 * upper)[1]
+    return np.asarray(match, np.intp)

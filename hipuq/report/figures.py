@@ -1,0 +1,115 @@
+"""Which figures a results tree has the data for."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from hipuq import plots
+from hipuq.report.summary import analyses
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of a report.
+
+    Attributes
+    ----------
+    analysis : str
+        The analysis that it belongs to.
+    name : str
+        Name of its file.
+    caption : str
+        What it shows, in a sentence or two.
+    figure : Figure
+    """
+
+    analysis: str
+    name: str
+    caption: str
+    figure: Figure
+
+
+def pictures(tree: xr.DataTree) -> Iterator[Picture]:
+    """Give the figures of a results tree, one after the other.
+
+    Parameters
+    ----------
+    tree : DataTree
+        As from `hipuq.load_results`.
+
+    Yields
+    ------
+    Picture
+    """
+    options = json.loads(tree.attrs.get("report", "{}"))
+    names = {int(mode): name for mode, name in options.get("mode_names", {}).items()}
+    for analysis in analyses(tree):
+        groups = {str(key): node.to_dataset(inherit=False) for key, node in tree[analysis].children.items()}
+        if "probability_mean" in groups.get("unstable", {}):
+            yield _occurrence(analysis, groups["unstable"], names)
+        if "mode_shapes" in groups:
+            yield _mode_shapes(analysis, groups["mode_shapes"], options, names)
+        if "friction_sweep" in groups:
+            yield from _sweep(analysis, groups["friction_sweep"], options)
+
+
+def _occurrence(analysis: str, results: xr.Dataset, names: dict[int, str]) -> Picture:
+    figure = Figure(figsize=(10, 7), layout="constrained")
+    plots.occurrence_panels(results, figure=figure, modes=sorted(names) or None, names=names or None)
+    caption = (
+        "Frequency of occurrence of instability by mode: minimum, mean and maximum over the contact "
+        "patterns of each number in contact. Samples without a known verdict are left out here and "
+        "counted in the limits of the table."
+    )
+    return Picture(analysis, "occurrence", caption, figure)
+
+
+def _mode_shapes(
+    analysis: str, shapes: xr.Dataset, options: dict[str, list[int]], names: dict[int, str]
+) -> Picture:
+    modes = options["mode_shapes"]
+    figure = Figure(figsize=(5.5 * len(modes), 5), layout="constrained")
+    for mode, ax in zip(modes, figure.subplots(1, len(modes), squeeze=False)[0], strict=True):
+        plots.mode_shape(shapes, mode, ax=ax)
+    called = [f"mode {mode} is published as mode {names[mode]}" for mode in modes if mode in names]
+    friction = options["shape_friction"]
+    caption = f"Mode shapes over the undeformed ring, all oscillators in contact, friction {friction}."
+    return Picture(
+        analysis, "mode_shapes", caption + (f" Here {'; '.join(called)}." if called else ""), figure
+    )
+
+
+def _sweep(analysis: str, sweep: xr.Dataset, options: dict[str, list[tuple[int, int]]]) -> Iterator[Picture]:
+    at = "at nominal values over the friction coefficient"
+    pairs = [(int(a), int(b)) for a, b in options["pairs"]]
+    if pairs:
+        figure = Figure(figsize=(5.5 * len(pairs), 7), layout="constrained")
+        plots.lock_in(sweep, pairs, figure=figure)
+        yield Picture(
+            analysis, "lock_in", f"Mode coupling: frequency and growth rate {at}, with the lock-in.", figure
+        )
+    figure = Figure(figsize=(10, 7), layout="constrained")
+    plots.dispersion(sweep, axes=figure.subplots(2, 1, sharex=True))
+    yield Picture(
+        analysis,
+        "dispersion",
+        f"Dispersion diagram: imaginary and real part of all eigenvalues {at}.",
+        figure,
+    )
+    figure = Figure(figsize=(8, 6), layout="constrained")
+    plots.root_locus(sweep, ax=figure.subplots())
+    yield Picture(analysis, "root_locus", f"Root locus: growth rate against frequency {at}.", figure)
+    figure = Figure(figsize=(8, 6), layout="constrained")
+    plots.damping_over_frequency(sweep, ax=figure.subplots())
+    yield Picture(
+        analysis,
+        "damping_ratio",
+        "Damping ratio of each mode against its frequency at the largest friction of the sweep; a "
+        "negative one belongs to a growing mode.",
+        figure,
+    )

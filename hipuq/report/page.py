@@ -1,0 +1,101 @@
+"""One self-contained HTML page of tables and figures."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from hipuq.errors import StoreError
+from hipuq.report.figures import pictures
+from hipuq.report.summary import analyses, estimates, headline, inputs_table, tables, trust
+
+RESOLUTION = 130
+"""Dots per inch of the pictures."""
+
+
+def write_report(tree: xr.DataTree, folder: str | os.PathLike[str]) -> Path:
+    """Write the figures and the report of a results tree.
+
+    Parameters
+    ----------
+    tree : DataTree
+        As from `hipuq.run_study` or `hipuq.load_results`.
+    folder : path
+        Gets ``figures/<analysis>-<figure>.png`` and ``report.html``.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be written.
+    """
+    import jinja2
+
+    target = Path(folder)
+    try:
+        (target / "figures").mkdir(parents=True, exist_ok=True)
+        images: dict[str, list[dict[str, str]]] = {}
+        for picture in pictures(tree):
+            buffer = io.BytesIO()
+            picture.figure.savefig(buffer, format="png", dpi=RESOLUTION)
+            name = f"{picture.analysis}-{picture.name}.png"
+            (target / "figures" / name).write_bytes(buffer.getvalue())
+            data = base64.b64encode(buffer.getvalue()).decode("ascii")
+            images.setdefault(picture.analysis, []).append({"data": data, "caption": picture.caption})
+        environment = jinja2.Environment(
+            loader=jinja2.PackageLoader("hipuq.report", "."),
+            autoescape=True,
+            undefined=jinja2.StrictUndefined,
+        )
+        page = environment.get_template("template.html").render(content(tree, images))
+        file = target / "report.html"
+        file.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"cannot write the report to {target}: {error.strerror}") from error
+    return file
+
+
+def content(tree: xr.DataTree, images: dict[str, list[dict[str, str]]]) -> dict[str, Any]:
+    """Return everything that the page shows.
+
+    Parameters
+    ----------
+    tree : DataTree
+    images : dict
+        Pictures by analysis.
+
+    Returns
+    -------
+    dict
+        Variables of the template.
+    """
+    names = json.loads(tree.attrs.get("report", "{}")).get("mode_names", {})
+    sections = []
+    for analysis in analyses(tree):
+        found = dict(estimates(tree, analysis))
+        if not found:
+            continue
+        first = next(iter(found.values()))
+        sections.append(
+            {
+                "name": analysis,
+                "attrs": first.attrs,
+                "trust": trust(first),
+                "headlines": [line for line in map(headline, found.values()) if line],
+                "inputs": inputs_table(first),
+                "tables": [table for results in found.values() for table in tables(results, names)],
+                "images": images.get(analysis, []),
+                "confidence": f"{first.attrs['confidence']:.0%}",
+            }
+        )
+    return {"study": tree.attrs, "sections": sections}

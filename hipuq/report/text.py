@@ -1,0 +1,51 @@
+"""Results as one screen of text."""
+
+from __future__ import annotations
+
+import json
+
+import xarray as xr
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table as RichTable
+
+from hipuq.report.summary import Table, analyses, estimates, headline, tables, trust
+
+
+def show_results(tree: xr.DataTree, console: Console | None = None) -> None:
+    """Print the results of a study.
+
+    Parameters
+    ----------
+    tree : DataTree
+        As from `hipuq.load_results`.
+    console : rich Console, optional
+        Where to print; by default standard output.
+    """
+    screen = Console(highlight=False, soft_wrap=not _is_wide()) if console is None else console
+    screen.print(f"[bold]{escape(str(tree.attrs.get('title', 'hipuq results')))}[/bold]")
+    names = json.loads(tree.attrs.get("report", "{}")).get("mode_names", {})
+    for analysis in analyses(tree):
+        for i, (of, results) in enumerate(estimates(tree, analysis)):
+            if i == 0:
+                line = f"{results.attrs['model']}, {results.attrs['method']}, seed {results.attrs['seed']}"
+                screen.print(f"\n[bold]{escape(analysis)}[/bold]: {escape(line)}")
+                screen.print(trust(results))
+            if "mode" not in results.dims:
+                screen.print(escape(f"{of}: {headline(results)}"))
+            for table in tables(results, names):
+                screen.print(_rich(table))
+
+
+def _is_wide() -> bool:
+    """Say whether tables fit; in a pipe lines must not be folded."""
+    return Console().is_terminal
+
+
+def _rich(table: Table) -> RichTable:
+    made = RichTable(title=escape(table.title), title_justify="left", title_style="none", box=None)
+    for i, column in enumerate(table.columns):
+        made.add_column(escape(column), justify="left" if i == 0 else "right")
+    for row in table.rows:
+        made.add_row(*map(escape, row))
+    return made

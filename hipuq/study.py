@@ -1,0 +1,258 @@
+"""Study files: study.toml -> `Study`, checked as a whole -> run.
+
+A study names a model, its uncertain inputs and one or more analyses. All of it is checked before
+anything is computed, and the results of an analysis are on disk before the next one begins.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from hipuq import __version__, schema
+from hipuq.driver import method_named
+from hipuq.errors import HipuqError, InputError, StoreError, StudyError, unknown_name
+from hipuq.evaluation import evaluate
+from hipuq.inputs import Inputs
+from hipuq.methods import Method
+from hipuq.models import MODELS, CEAModel
+from hipuq.sampling import seed_of
+from hipuq.store import RESULTS_NAME, save_outcomes, save_results
+from hipuq.study_file import ReportTable, StudyFile, read_study_file
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """One analysis of a study, ready to run.
+
+    Attributes
+    ----------
+    name : str
+        Name of its group in the results.
+    model : CEAModel
+        The model with the analysis' preset and options.
+    inputs : Inputs
+        The uncertain parameters.
+    method : str
+        Name of the method.
+    n : int
+        Size of the design.
+    of : tuple of str
+        Outcomes to analyse.
+    design_options, estimate_options : mapping
+        Options of the method's two stages.
+    evaluations : int
+        Model runs that it takes.
+    """
+
+    name: str
+    model: CEAModel
+    inputs: Inputs
+    method: str
+    n: int
+    of: tuple[str, ...]
+    design_options: Mapping[str, Any]
+    estimate_options: Mapping[str, Any]
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study, checked and ready to run.
+
+    Attributes
+    ----------
+    name : str
+        Name of its folder.
+    title, description : str
+        For people.
+    seed : int
+        Seed from which each analysis gets its own.
+    analyses : tuple of Analysis
+    report : ReportTable
+        What figures show.
+    text : str
+        The study file as it was read.
+    """
+
+    name: str
+    title: str
+    description: str
+    seed: int
+    analyses: tuple[Analysis, ...]
+    report: ReportTable
+    text: str
+
+
+def load_study(path: str | os.PathLike[str], *, seed: int | None = None) -> Study:
+    """Read and check a study.
+
+    Parameters
+    ----------
+    path : path
+        A study folder or its study.toml.
+    seed : int, optional
+        In place of the study's own.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    StudyError
+        If it cannot be read, or anything in it cannot be used; one line that says where.
+    """
+    file = Path(path)
+    if file.is_dir():
+        file = file / "study.toml"
+    text, table = read_study_file(file)
+    analyses = []
+    for entry in table.analysis:
+        try:
+            analyses.append(_analysis(table, entry.name))
+        except HipuqError as error:
+            raise StudyError(f"{file}, analysis {entry.name!r}: {error}") from error
+    try:
+        chosen = table.seed if seed is None else seed_of(seed)
+    except InputError as error:
+        raise StudyError(f"seed: {error}") from error
+    name = file.resolve().parent.name if file.name == "study.toml" else file.stem
+    return Study(name, table.title, table.description, chosen, tuple(analyses), table.report, text)
+
+
+def run_study(
+    study: Study,
+    out: str | os.PathLike[str],
+    *,
+    n_jobs: int | None = None,
+    progress: bool | None = None,
+    say: Callable[[str], None] = lambda line: None,
+) -> xr.DataTree:
+    """Run a study and write its outcomes and results.
+
+    Parameters
+    ----------
+    study : Study
+    out : path
+        Output folder; gets ``outcomes/<analysis>.zarr`` and ``results.nc``.
+    n_jobs : int, optional
+        Threads; all cores by default.
+    progress : bool, optional
+        Whether to show progress bars; by default on a terminal.
+    say : callable, optional
+        Gets a line about each analysis.
+
+    Returns
+    -------
+    DataTree
+        Groups ``<analysis>/<of>``; where the report asks for them also
+        ``<analysis>/friction_sweep`` and ``<analysis>/mode_shapes`` at nominal values.
+
+    Raises
+    ------
+    StoreError
+        If the folder cannot be written.
+    """
+    folder = Path(out)
+    _check_writable(folder)
+    root = xr.Dataset(
+        attrs={
+            "hipuq_version": __version__,
+            "study": study.name,
+            "title": study.title,
+            "description": study.description,
+            "seed": study.seed,
+            "report": study.report.model_dump_json(),
+            "study_file": study.text,
+        }
+    )
+    groups: dict[str, xr.Dataset] = {"/": root}
+    for i, analysis in enumerate(study.analyses):
+        # Each analysis has its own stream, so that one more at the end changes no other.
+        seed = seed_of(np.random.SeedSequence(study.seed, spawn_key=(i,)))
+        method = method_named(analysis.method)
+        samples = method.design(analysis.inputs, analysis.n, seed, **analysis.design_options)
+        outcomes = evaluate(analysis.model, samples, keep=analysis.of, n_jobs=n_jobs, progress=progress)
+        save_outcomes(outcomes, folder / "outcomes" / f"{analysis.name}.zarr")
+        for of in analysis.of:
+            groups[f"{analysis.name}/{of}"] = method.estimate(
+                outcomes, analysis.inputs, of=of, rng=seed, **analysis.estimate_options
+            )
+        groups |= _at_nominal(analysis, study.report, n_jobs)
+        save_results(xr.DataTree.from_dict(groups), folder / RESULTS_NAME)
+        open_ = int((outcomes["status"] == schema.STATUS["undecided"]).sum())
+        say(
+            f"{analysis.name}: {outcomes.sizes['sample']:,} evaluations of {analysis.model.label} in "
+            f"{outcomes.attrs['seconds']:.1f} s, {open_:,} undecided"
+        )
+    return xr.DataTree.from_dict(groups)
+
+
+def _at_nominal(analysis: Analysis, report: ReportTable, n_jobs: int | None) -> dict[str, xr.Dataset]:
+    """Return the friction sweep and the mode shapes at nominal values that the report shows."""
+    groups = {}
+    model = analysis.model
+    if report.friction_sweep is not None:
+        grid = np.linspace(*report.friction_sweep, report.friction_points)
+        sweep = evaluate(model, model.nominal(friction=grid), n_jobs=n_jobs, progress=False)
+        groups[f"{analysis.name}/friction_sweep"] = sweep
+    if report.mode_shapes:
+        sample = model.nominal(friction=report.shape_friction)
+        shapes = schema.stamp(
+            model.mode_shapes(sample),
+            f"mode shapes at friction {report.shape_friction}",
+            model=model.label,
+            options={"model": model.options},
+        )
+        groups[f"{analysis.name}/mode_shapes"] = shapes
+    return groups
+
+
+def _check_writable(folder: Path) -> None:
+    """Raise a StoreError now rather than after the computation."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / f".hipuq-{os.getpid()}"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise StoreError(
+            f"cannot write to {folder}: {error.strerror}; choose another folder with --out"
+        ) from error
+
+
+def _analysis(table: StudyFile, name: str) -> Analysis:
+    """Return one analysis with what it overrides."""
+    entry = next(entry for entry in table.analysis if entry.name == name)
+    model = _model({**table.model, **({"preset": entry.preset} if entry.preset else {}), **entry.model})
+    inputs = model.inputs(
+        **{key: value.distribution_for(key) for key, value in {**table.inputs, **entry.inputs}.items()}
+    )
+    method: Method = method_named(entry.method)
+    designing, estimating = method.split(entry.options)
+    for of in entry.of:
+        if of not in model.outcomes:
+            raise unknown_name("outcome in of", of, model.outcomes)
+    evaluations = method.evaluations(inputs, entry.n, **designing)
+    return Analysis(
+        name, model, inputs, entry.method, entry.n, tuple(entry.of), designing, estimating, evaluations
+    )
+
+
+def _model(options: Mapping[str, Any]) -> CEAModel:
+    """Return the model that a [model] table describes."""
+    rest = dict(options)
+    name = rest.pop("name", None)
+    if name not in MODELS:
+        raise unknown_name("model", name, MODELS)
+    try:
+        return MODELS[name](**rest)
+    except TypeError as error:
+        raise InputError(f"model {name!r} does not take these options: {error}") from error
