@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -71,20 +69,20 @@ def student(mean: Array, squares: Array, n: Array, confidence: float) -> tuple[A
     return mean - half, mean + half
 
 
-def combined(
-    estimates: Sequence[xr.DataArray], weight: xr.DataArray, dim: str
-) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
+def combined(table: xr.Dataset, weight: str, dim: str) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
     """Return a weighted mean of independent estimates over `dim`, with its interval.
 
     Distances to the limits are added in squares, which keeps the good behaviour of the single
-    intervals near 0 and 1 (Zou and Donner, Stat. Med. 27 (2008) 1693).
+    intervals near 0 and 1 (Zou and Donner, Stat. Med. 27 (2008) 1693). Only what is left to chance
+    goes so: what is unknown may be all on one side, so limits are measured from the estimates with
+    every unknown counted as 0 (``floor``) and as 1 (``ceiling``).
 
     Parameters
     ----------
-    estimates : sequence of DataArray
-        Estimate, lower and upper limit.
-    weight : DataArray
-        Over `dim`; it need not add up to 1.
+    table : Dataset
+        ``estimate``, ``low``, ``high``, ``floor``, ``ceiling`` and the weights.
+    weight : str
+        Name of the weights over `dim`; they need not add up to 1.
     dim : str
 
     Returns
@@ -92,14 +90,16 @@ def combined(
     estimate, low, high : DataArray
         NaN if one of the estimates that has a weight is.
     """
-    estimate, low, high = estimates
-    share = weight / weight.sum(dim)
+    share = table[weight] / table[weight].sum(dim)
     used = share > 0
 
     def total(part: xr.DataArray) -> xr.DataArray:
         return part.where(used, 0.0).sum(dim, skipna=False)
 
-    centre = total(share * estimate)
-    below = total((share * (estimate - low)) ** 2) ** 0.5
-    above = total((share * (high - estimate)) ** 2) ** 0.5
-    return centre, centre - below, centre + above
+    below = total((share * (table["floor"] - table["low"])) ** 2) ** 0.5
+    above = total((share * (table["high"] - table["ceiling"])) ** 2) ** 0.5
+    return (
+        total(share * table["estimate"]),
+        total(share * table["floor"]) - below,
+        total(share * table["ceiling"]) + above,
+    )

@@ -208,14 +208,16 @@ def estimate(
     strata = 1 if levels is None else levels.sizes[levels.attrs["dim"]]
     replicates, replicate = _replicates(outcomes)
     cells = moments(values, level * replicates + replicate, strata * replicates)
-    limits = _limits(cells.reshaped(strata, replicates), kind, confidence)
+    table = cells.reshaped(strata, replicates)
     dims = ([] if levels is None else [levels.attrs["dim"]]) + [str(d) for d in values.dims[1:]]
-    pooled = cells.reshaped(strata, replicates).pooled()
-    columns = [*limits, pooled.known, pooled.variance]
-    arrays = [xr.DataArray(column if levels is not None else column[0], dims=dims) for column in columns]
+    columns = _columns(table, kind, confidence)
+    arrays = {
+        name: xr.DataArray(column if levels is not None else column[0], dims=dims)
+        for name, column in columns.items()
+    }
     results = labelled(values, kind, arrays)
     if levels is not None:
-        results = with_summaries(results, levels, kind.quantity)
+        results = with_summaries(results, levels, kind.quantity, arrays)
     return finished(results, outcomes, inputs, of=of, method="monte_carlo", confidence=confidence)
 
 
@@ -227,17 +229,24 @@ def _replicates(outcomes: xr.Dataset) -> tuple[int, NDArray[np.intp]]:
     return len(names), replicate.astype(np.intp)
 
 
-def _limits(cells: Moments, kind: Kind, confidence: float) -> tuple[Array, Array, Array]:
-    """Return estimate, lower and upper limit by stratum from moments (strata, replicates, ...)."""
+def _columns(cells: Moments, kind: Kind, confidence: float) -> dict[str, Array]:
+    """Return estimates and limits by stratum from moments (strata, replicates, ...)."""
     pooled = cells.pooled()
+    floor, ceiling = cells, cells
     if kind.bounded:
-        worst, best = cells.with_unknown(0.0), cells.with_unknown(1.0)
-    else:
-        worst = best = cells
-    low, high = _limit(worst, kind, confidence)[0], _limit(best, kind, confidence)[1]
+        floor, ceiling = cells.with_unknown(0.0), cells.with_unknown(1.0)
+    low, high = _limit(floor, kind, confidence)[0], _limit(ceiling, kind, confidence)[1]
     if kind.bounded:
         low, high = np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
-    return pooled.mean, low, high
+    return {
+        "estimate": pooled.mean,
+        "low": low,
+        "high": high,
+        "floor": floor.pooled().mean,
+        "ceiling": ceiling.pooled().mean,
+        "known": pooled.known,
+        "variance": pooled.variance,
+    }
 
 
 def _limit(cells: Moments, kind: Kind, confidence: float) -> tuple[Array, Array]:

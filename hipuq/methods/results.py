@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,9 @@ from hipuq import schema
 from hipuq.errors import SchemaError
 from hipuq.inputs import Inputs
 from hipuq.methods.intervals import combined
+
+ENDS = {"": "", "_low": ", lower limit", "_high": ", upper limit"}
+"""Ends of the names of an estimate and its limits -> what they add to its long_name."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ def levels_of(outcomes: xr.Dataset, inputs: Inputs) -> tuple[xr.Dataset | None, 
     return None, np.zeros(outcomes.sizes["sample"], np.intp)
 
 
-def labelled(values: xr.DataArray, kind: Kind, arrays: Sequence[xr.DataArray]) -> xr.Dataset:
+def labelled(values: xr.DataArray, kind: Kind, arrays: Mapping[str, xr.DataArray]) -> xr.Dataset:
     """Return estimate, limits, known counts and, for a mean, the variance as a Dataset.
 
     Parameters
@@ -86,8 +89,8 @@ def labelled(values: xr.DataArray, kind: Kind, arrays: Sequence[xr.DataArray]) -
     values : DataArray
         The outcome, for its name, unit and coords.
     kind : Kind
-    arrays : sequence of DataArray
-        Estimate, lower limit, upper limit, known samples, variance.
+    arrays : mapping of DataArray
+        ``estimate``, ``low``, ``high``, ``known`` and, for a mean, ``variance``.
 
     Returns
     -------
@@ -96,15 +99,13 @@ def labelled(values: xr.DataArray, kind: Kind, arrays: Sequence[xr.DataArray]) -
     name = str(values.attrs.get("long_name", values.name))
     units = "1" if kind.bounded else str(values.attrs.get("units", ""))
     what = f"probability: {name}" if kind.bounded else f"mean of {name}"
-    keys = [kind.quantity, f"{kind.quantity}_low", f"{kind.quantity}_high", "known"]
-    texts = [what, f"{what}, lower limit", f"{what}, upper limit", "samples with a known outcome"]
     results = xr.Dataset()
-    for key, text, array in zip(keys, texts, arrays, strict=False):
-        unit = "1" if key == "known" else units
-        results[key] = array.assign_attrs(long_name=text, units=unit)
+    for key, (end, text) in zip(("estimate", "low", "high"), ENDS.items(), strict=True):
+        results[kind.quantity + end] = arrays[key].assign_attrs(long_name=what + text, units=units)
+    results["known"] = arrays["known"].assign_attrs(long_name="samples with a known outcome", units="1")
     if not kind.bounded:
         square = f"({units})^2" if units else ""
-        results["variance"] = arrays[4].assign_attrs(long_name=f"variance of {name}", units=square)
+        results["variance"] = arrays["variance"].assign_attrs(long_name=f"variance of {name}", units=square)
     kept = {
         key: coord
         for key, coord in values.coords.items()
@@ -113,7 +114,9 @@ def labelled(values: xr.DataArray, kind: Kind, arrays: Sequence[xr.DataArray]) -
     return results.assign_coords(kept)
 
 
-def with_summaries(results: xr.Dataset, levels: xr.Dataset, quantity: str) -> xr.Dataset:
+def with_summaries(
+    results: xr.Dataset, levels: xr.Dataset, quantity: str, arrays: Mapping[str, xr.DataArray]
+) -> xr.Dataset:
     """Add what is summed up over levels: overall by weight, and for each group of levels.
 
     Parameters
@@ -124,6 +127,8 @@ def with_summaries(results: xr.Dataset, levels: xr.Dataset, quantity: str) -> xr
         With attributes ``dim``, ``group`` (a coord) and ``group_dim``.
     quantity : str
         ``"probability"`` or ``"mean"``.
+    arrays : mapping of DataArray
+        ``estimate``, ``low``, ``high``, ``floor`` and ``ceiling`` by level, see `combined`.
 
     Returns
     -------
@@ -135,39 +140,33 @@ def with_summaries(results: xr.Dataset, levels: xr.Dataset, quantity: str) -> xr
     dim, group, group_dim = (levels.attrs[key] for key in ("dim", "group", "group_dim"))
     labels = levels.drop_vars("weight")
     results = results.assign_coords(labels.variables).assign(weight=levels["weight"])
-    triple = [results[quantity + end] for end in ("", "_low", "_high")]
-    what, units = triple[0].attrs["long_name"], triple[0].attrs["units"]
-    ends = {"": "", "_low": ", lower limit", "_high": ", upper limit"}
+    what, units = (results[quantity].attrs[key] for key in ("long_name", "units"))
+    table = xr.Dataset(dict(arrays)).assign(weight=results["weight"], plain=xr.ones_like(results["weight"]))
 
     def put(key: str, value: xr.DataArray, text: str) -> None:
         results[key] = value.drop_attrs().assign_attrs(long_name=text, units=units)
 
-    overall = combined(triple, results["weight"], dim)
-    for (end, text), value in zip(ends.items(), overall, strict=True):
+    overall = combined(table, "weight", dim)
+    for (end, text), value in zip(ENDS.items(), overall, strict=True):
         put(f"{quantity}_overall{end}", value, f"{what}, weighted over all levels{text}")
     names = np.unique(levels[group].values)
-    places = [results[group].values == name for name in names]
+    parts = [table.isel({dim: results[group].values == name}) for name in names]
     index = xr.DataArray(names, dims=group_dim, attrs=schema.COORDINATES[group_dim].attrs)
 
-    def by_group(parts: list[xr.DataArray]) -> xr.DataArray:
-        return xr.concat(parts, dim=xr.Variable(group_dim, names), coords="minimal", join="exact")
+    def by_group(values: list[xr.DataArray]) -> xr.DataArray:
+        return xr.concat(values, dim=xr.Variable(group_dim, names), coords="minimal", join="exact")
 
-    plain = [
-        combined([part.isel({dim: place}) for part in triple], xr.ones_like(results["weight"][place]), dim)
-        for place in places
-    ]
-    for i, (end, text) in enumerate(ends.items()):
-        value = by_group([part[i] for part in plain])
+    plain = [combined(part, "plain", dim) for part in parts]
+    for i, (end, text) in enumerate(ENDS.items()):
+        value = by_group([triple[i] for triple in plain])
         put(f"{quantity}_mean{end}", value, f"{what}, mean over the levels of a group{text}")
-    weighted = [
-        combined([part.isel({dim: place}) for part in triple], results["weight"][place], dim)[0]
-        for place in places
-    ]
-    put(f"{quantity}_weighted", by_group(weighted), f"{what}, weighted mean over a group")
+    weighted = by_group([combined(part, "weight", dim)[0] for part in parts])
+    put(f"{quantity}_weighted", weighted, f"{what}, weighted mean over a group")
     for end in ("min", "max"):
-        value = by_group([getattr(triple[0].isel({dim: place}), end)(dim, skipna=False) for place in places])
+        value = by_group([getattr(part["estimate"], end)(dim, skipna=False) for part in parts])
         put(f"{quantity}_{end}", value, f"{what}, {end}imum over the levels of a group")
-    return results.assign_coords({group_dim: index})
+    # Says which coord over the levels the group dim sums up.
+    return results.assign_coords({group_dim: index}).assign_attrs(levels_group=group)
 
 
 def finished(
@@ -183,6 +182,7 @@ def finished(
     }
     for name, (value, long_name, units) in counts.items():
         results[name] = ((), value, {"long_name": long_name, "units": units})
+    kept = {key: results.attrs[key] for key in ("levels_group",) if key in results.attrs}
     results = schema.stamp(
         results.drop_attrs(deep=False),
         f"estimate {method} of {of}",
@@ -192,4 +192,4 @@ def finished(
         like=outcomes.attrs,
     )
     results.attrs.pop("seconds", None)
-    return results.assign_attrs(of=of, confidence=confidence)
+    return results.assign_attrs(of=of, confidence=confidence, **kept)

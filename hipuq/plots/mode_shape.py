@@ -60,7 +60,7 @@ def mode_shape(shapes: xr.Dataset, mode: int, *, ax: Axes | None = None, scale: 
     moved = moved * (scale / largest) if largest > 0 else moved
     end = start + moved
 
-    ax = new_axes(ax, 6.4, 5.0)
+    ax = new_axes(ax, 6.4, 4.4)
     turn = np.unwrap(np.arctan2(start[:, 1], start[:, 0]))
     arc = np.linspace(turn[0], turn[-1], 181)
     ax.plot(SOCKET * np.cos(arc), SOCKET * np.sin(arc), color=BLACK, linewidth=0.8, label="socket")
@@ -75,19 +75,20 @@ def mode_shape(shapes: xr.Dataset, mode: int, *, ax: Axes | None = None, scale: 
         scale=1.0,
         color=BLUE,
         width=0.004,
-        label="displacement",
     )
-    inside = 1 - 0.14 / np.hypot(*start.T)
-    for number, (x, y) in zip(chosen["oscillator"].values, start * inside[:, None], strict=True):
+    # A number stands on the side of the socket that its mass does not move to.
+    outwards = (start * moved).sum(axis=1) > 0.02
+    radius = np.where(outwards, 0.87, SOCKET + 0.09)
+    for number, (x, y) in zip(chosen["oscillator"].values, start * radius[:, None], strict=True):
         ax.text(x, y, str(number), ha="center", va="center", fontsize="small", color=BLACK)
     ax.set_aspect("equal")
-    reach = np.concatenate([start * SOCKET, end])
-    (left, bottom), (right, top) = reach.min(axis=0) - 0.12, reach.max(axis=0) + 0.12
+    reach = np.concatenate([start * (SOCKET + 0.09), end])
+    (left, bottom), (right, top) = reach.min(axis=0) - 0.08, reach.max(axis=0) + 0.08
     ax.set_xlim(left, right)
     ax.set_ylim(bottom, top)
     frequency, growth = float(chosen["frequency"]), float(chosen["growth_rate"])
     ax.set_title(f"mode {mode}: {frequency:.1f} Hz, growth rate {growth + 0.0:.3g} 1/s")
     ax.set_xlabel("x [radii]")
     ax.set_ylabel("y [radii]")
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, frameon=False, fontsize="small")
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3, frameon=False, fontsize="small")
     return ax

@@ -65,7 +65,10 @@ def occurrence(
     ax.set_title(_title(results, count))
     ax.set_xlabel(_mode_label(chosen, names))
     ax.set_ylabel(_probability_label(results))
-    ax.legend(loc="upper left")
+    # Room for the legend above 100 %, where no data can be.
+    ax.set_ylim(-4, 120)
+    ax.set_yticks(range(0, 101, 20))
+    ax.legend(loc="upper center", ncols=3, fontsize="small")
     return ax
 
 
@@ -76,7 +79,7 @@ def occurrence_panels(
     counts: Sequence[int] | None = None,
     modes: Sequence[int] | None = None,
     names: Mapping[int, str] | None = None,
-) -> NDArray[np.object_]:
+) -> NDArray[Any]:
     """Draw `occurrence` for every number in contact, axes shared.
 
     Parameters
@@ -125,7 +128,7 @@ def _checked(results: xr.Dataset) -> xr.Dataset:
     for name in NEEDED:
         if name not in results or set(results[name].dims) != {"count", "mode"}:
             raise SchemaError(
-                f"the figure needs {name!r} over (count, mode): results of 'unstable' in a stratified analysis"
+                f"the figure needs {name!r} over (count, mode): a stratified analysis of 'unstable'"
             )
     return results
 
@@ -177,7 +180,7 @@ def _draw(ax: Axes, chosen: xr.Dataset, count: int, names: Mapping[int, str], me
     unknown = np.isnan(mean)
     for x in place[unknown]:
         ax.annotate("?", (x, 0.02), xycoords=("data", "axes fraction"), ha="center", va="bottom")
-    ax.set_xticks(place, [_tick(chosen, i, names) for i in place])
+    ax.set_xticks(place, [_tick(chosen, i, names) for i in range(len(place))])
     ax.tick_params(axis="x", labelsize="small")
     ax.set_xlim(-0.6, len(place) - 0.4)
     ax.set_ylim(-4, 104)
@@ -193,7 +196,7 @@ def _tick(chosen: xr.Dataset, place: int, names: Mapping[int, str]) -> str:
 
 def _mode_label(chosen: xr.Dataset, names: Mapping[int, str] | None) -> str:
     label = "pair of modes, by ascending frequency" if "pair" in chosen.coords else "mode"
-    return f"{label} (mode named in the paper)" if names else label
+    return f"{label} (name in the paper)" if names else label
 
 
 def _probability_label(results: xr.Dataset) -> str:

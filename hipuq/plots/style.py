@@ -70,7 +70,7 @@ def new_axes(ax: Axes | None, width: float = 6.4, height: float = 4.4) -> Axes:
 
 def new_panels(
     figure: FigureBase | None, rows: int, columns: int, size: tuple[float, float], **options: Any
-) -> NDArray[np.object_]:
+) -> NDArray[Any]:
     """Return a grid of Axes in `figure`, or in a new one.
 
     Parameters

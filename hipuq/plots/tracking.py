@@ -1,8 +1,9 @@
 """Modes followed over a friction sweep, and the friction at which they lock in.
 
 A mode number is the rank of its frequency. A coalesced pair passes other modes as friction grows,
-and then all ranks shift, though nothing happens to the pair; so a figure over friction needs modes
-that are followed. They bear the number that they have at the largest friction.
+and then ranks shift though nothing happens to the pair; so a figure over friction needs modes that
+are followed. They bear the numbers that they have where most of them are unstable for the first time:
+the pairs that can lock in have all done so there, and have not yet passed each other.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ TRACKED = ("frequency", "growth_rate", "unstable")
 
 
 def follow_modes(outcomes: xr.Dataset) -> xr.Dataset:
-    """Return the modes of a friction sweep, each followed from the largest friction downwards.
+    """Return the modes of a friction sweep, each followed over friction.
 
-    From one friction to the next modes are matched so that their eigenvalues move least in all and,
-    as far as verdicts are known, growing modes stay growing and decaying ones decaying. Samples
+    From one friction to the next modes are matched so that their eigenvalues move least in all, and
+    growing modes stay growing and decaying ones decaying as far as verdicts are known. Samples
     without frequencies (failed ones) are left out.
 
     Parameters
@@ -36,7 +37,8 @@ def follow_modes(outcomes: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     Dataset
-        The same variables by ascending friction; ``mode`` is the number at the largest friction.
+        The same variables by ascending friction. ``mode`` is the number at ``reference_friction``,
+        the smallest friction at which the most modes are known to be unstable.
 
     Raises
     ------
@@ -45,20 +47,29 @@ def follow_modes(outcomes: xr.Dataset) -> xr.Dataset:
     InputError
         If another parameter varies, or no sample is left.
     """
-    sweep = _sorted_sweep(outcomes)
+    sweep = sorted_sweep(outcomes)
     frequency, growth, unstable = (sweep[name].values.astype(np.float64) for name in TRACKED)
     roots = growth + 2j * np.pi * frequency
-    kind = np.where(np.isnan(unstable), np.nan, np.sign(growth))
+    kind = np.where(np.isnan(unstable), 0.0, np.sign(growth))
+    reference = int((unstable == 1).sum(axis=1).argmax())
     place = np.empty(frequency.shape, np.intp)
-    last = len(place) - 1
-    place[last] = np.arange(frequency.shape[1])
-    for i in range(last, 0, -1):
+    place[reference] = np.arange(frequency.shape[1])
+    for i in range(reference, 0, -1):
         place[i - 1] = _next_places(roots[i, place[i]], kind[i, place[i]], roots[i - 1], kind[i - 1])
+    for i in range(reference, len(place) - 1):
+        place[i + 1] = _next_places(roots[i, place[i]], kind[i, place[i]], roots[i + 1], kind[i + 1])
     columns = {
         name: (("sample", "mode"), np.take_along_axis(sweep[name].values, place, axis=1), sweep[name].attrs)
         for name in TRACKED
     }
-    return sweep[["friction"]].assign(columns).assign_coords(mode=sweep["mode"])
+    attrs = {"long_name": "friction at which modes have their numbers", "units": "1"}
+    return (
+        sweep[["friction"]]
+        .assign(columns)
+        .assign_coords(
+            mode=sweep["mode"], reference_friction=((), sweep["friction"].values[reference], attrs)
+        )
+    )
 
 
 def lock_in_bracket(outcomes: xr.Dataset, mode: int) -> tuple[float, float]:
@@ -69,7 +80,7 @@ def lock_in_bracket(outcomes: xr.Dataset, mode: int) -> tuple[float, float]:
     outcomes : Dataset
         A friction sweep, as for `follow_modes`.
     mode : int
-        Its number at the largest friction: that of the growing mode, the upper of its pair.
+        Its number as in `follow_modes`: that of the growing mode, the upper of its pair.
 
     Returns
     -------
@@ -78,11 +89,24 @@ def lock_in_bracket(outcomes: xr.Dataset, mode: int) -> tuple[float, float]:
     high : float
         Smallest friction at which it is known to be unstable. Both are NaN if there is none.
     """
-    return _bracket(follow_modes(outcomes), mode)
+    return bracket(follow_modes(outcomes), mode)
 
 
-def _bracket(sweep: xr.Dataset, mode: int) -> tuple[float, float]:
-    """Return the lock-in bracket of a mode that has been followed."""
+def bracket(sweep: xr.Dataset, mode: int) -> tuple[float, float]:
+    """Return the lock-in bracket of a mode that has been followed already.
+
+    Parameters
+    ----------
+    sweep : Dataset
+        From `follow_modes`.
+    mode : int
+        Its number.
+
+    Returns
+    -------
+    low, high : float
+        As `lock_in_bracket`.
+    """
     check_modes(sweep, [mode])
     friction = sweep["friction"].values
     verdict = sweep["unstable"].sel(mode=mode).values
@@ -110,8 +134,24 @@ def check_modes(sweep: xr.Dataset, modes: list[int]) -> None:
             raise InputError(f"mode {mode} is not in the sweep: it must be one of {allowed}")
 
 
-def _sorted_sweep(outcomes: xr.Dataset) -> xr.Dataset:
-    """Return the checked sweep by ascending friction, without samples that have no frequencies."""
+def sorted_sweep(outcomes: xr.Dataset) -> xr.Dataset:
+    """Return a checked sweep by ascending friction, without samples that have no frequencies.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+        As for `follow_modes`.
+
+    Returns
+    -------
+    Dataset
+        Friction, frequency, growth rate and verdict, modes as they are numbered.
+
+    Raises
+    ------
+    SchemaError, InputError
+        As `follow_modes`.
+    """
     for name in ("friction", *TRACKED):
         if name not in outcomes:
             raise SchemaError(f"the sweep needs {name!r}: outcomes of a friction sweep, all modes")
@@ -138,14 +178,12 @@ def _next_places(
 ) -> NDArray[np.intp]:
     """Return for each root its match among the others.
 
-    `kind` is 1 for growing, -1 for decaying, 0 for neither, NaN for unknown; a known change of it
-    costs more than any move. Of two roots that a pair splits into, the growing one gets the upper:
-    both ways are the same distance.
+    `kind` is 1 for growing, -1 for decaying, 0 for neither or unknown; a change of it costs as much as
+    the longest move. Of two roots that a pair splits into, the growing one gets the upper: both ways
+    are the same distance.
     """
     cost = np.abs(roots[:, None] - others)
-    longest = cost.max()
-    upper = np.nan_to_num(kind)[:, None] * (others.imag - roots.imag[:, None])
-    with np.errstate(invalid="ignore"):
-        changed = np.abs(kind[:, None] - other_kind) > 0
-    match = linear_sum_assignment(cost + longest * changed - 1e-6 * upper)[1]
+    changed = kind[:, None] != other_kind
+    upper = kind[:, None] * (others.imag - roots.imag[:, None])
+    match = linear_sum_assignment(cost + cost.max() * changed - 1e-6 * upper)[1]
     return np.asarray(match, np.intp)

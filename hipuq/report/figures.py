@@ -60,7 +60,7 @@ def pictures(tree: xr.DataTree) -> Iterator[Picture]:
 
 def _occurrence(analysis: str, results: xr.Dataset, names: dict[int, str]) -> Picture:
     figure = Figure(figsize=(10, 7), layout="constrained")
-    plots.occurrence_panels(results, figure=figure, modes=sorted(names) or None, names=names or None)
+    plots.occurrence_panels(results, figure=figure, names=names or None)
     caption = (
         "Frequency of occurrence of instability by mode: minimum, mean and maximum over the contact "
         "patterns of each number in contact. Samples without a known verdict are left out here and "

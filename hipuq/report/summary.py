@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,7 +82,7 @@ def trust(results: xr.Dataset) -> str:
 
 
 def tables(results: xr.Dataset, mode_names: dict[str, str] | None = None) -> list[Table]:
-    """Return the tables of one result: by group of levels, by mode, or by both.
+    """Return the tables of one result, the most telling one first.
 
     Parameters
     ----------
@@ -94,50 +94,90 @@ def tables(results: xr.Dataset, mode_names: dict[str, str] | None = None) -> lis
     Returns
     -------
     list of Table
+        By group of levels (a column each where there are modes), or by mode, or none.
     """
     quantity = "probability" if "probability" in results else "mean"
-    text = share if quantity == "probability" else number
-    per_mode = "mode" in results.dims
-    modes: list[int | None] = [*_modes_shown(results, quantity)] if per_mode else [None]
-    made = []
     if f"{quantity}_mean" in results:
-        group = next(str(d) for d in results[f"{quantity}_mean"].dims if d != "mode")
-        heading = results[group].attrs.get("long_name", group)
-        columns = [heading, "levels", "mean", "interval of the mean", "minimum", "maximum", "weighted mean"]
+        if "mode" in results.dims:
+            return _by_mode_and_group(results, quantity, mode_names)
+        return [_by_group(results, quantity)]
+    if "mode" in results.dims:
+        return [_by_mode(results, quantity, mode_names)]
+    return []
+
+
+def _by_group(results: xr.Dataset, quantity: str) -> Table:
+    """Return a row for each group of levels."""
+    text = _text(quantity)
+    group = str(results[f"{quantity}_mean"].dims[0])
+    rows = []
+    for value, size in _groups(results, group):
+        part = results.sel({group: value})
+        ends = ("mean", "mean_low", "mean_high", "min", "max", "weighted")
+        mean, low, high, least, most, weighted = (text(float(part[f"{quantity}_{end}"])) for end in ends)
+        rows.append([str(value), str(size), mean, f"{low} to {high}", least, most, weighted])
+    heading = str(results[group].attrs.get("long_name", group))
+    columns = [heading, "levels", "mean", "interval", "minimum", "maximum", "weighted mean"]
+    return Table(f"{_title(results, quantity)}, over the levels of each group", columns, rows)
+
+
+def _by_mode_and_group(results: xr.Dataset, quantity: str, names: dict[str, str] | None) -> list[Table]:
+    """Return mean and range, and the interval of the mean, a row for each mode."""
+    text = _text(quantity)
+    group = next(str(dim) for dim in results[f"{quantity}_mean"].dims if dim != "mode")
+    groups = _groups(results, group)
+    heading = str(results[group].attrs.get("long_name", group))
+    forms = {
+        "mean (minimum to maximum)": ("{0} ({1} to {2})", ("mean", "min", "max")),
+        "interval of the mean": ("{0} to {1}", ("mean_low", "mean_high")),
+    }
+    made = []
+    for title, (form, ends) in forms.items():
         rows = []
-        for mode in modes:
-            part = results if mode is None else results.sel(mode=mode)
-            for value in results[group].values:
-                at = part.sel({group: value})
-                cells = [
-                    f"{quantity}_{end}" for end in ("mean", "mean_low", "mean_high", "min", "max", "weighted")
-                ]
-                mean, low, high, least, most, weighted = (text(float(at[key])) for key in cells)
-                label = [] if mode is None else [mode_label(results, mode, mode_names)]
-                size = int((results[_group_coord(results, group)] == value).sum())
-                rows.append([*label, str(value), str(size), mean, f"{low} to {high}", least, most, weighted])
-        made.append(
-            Table(f"{_title(results, quantity)} by {heading}", (["mode"] if per_mode else []) + columns, rows)
-        )
-    elif per_mode:
-        rows = [
-            [
-                mode_label(results, mode, mode_names),
-                *(text(float(results.sel(mode=mode)[quantity + end])) for end in ("", "_low", "_high")),
+        for mode in _modes_shown(results, quantity):
+            at = results.sel(mode=mode)
+            cells = [
+                form.format(*(text(float(at[f"{quantity}_{end}"].sel({group: value}))) for end in ends))
+                for value, _ in groups
             ]
-            for mode in _modes_shown(results, quantity)
+            rows.append([mode_label(results, mode, names), *cells])
+        columns = [
+            "mode",
+            *(f"{value} {heading}" if i == 0 else str(value) for i, (value, _) in enumerate(groups)),
         ]
-        made.append(Table(f"{_title(results, quantity)} by mode", ["mode", quantity, "low", "high"], rows))
+        made.append(Table(f"{_title(results, quantity)}: {title}", columns, rows))
     return made
+
+
+def _by_mode(results: xr.Dataset, quantity: str, names: dict[str, str] | None) -> Table:
+    """Return a row for each mode."""
+    text = _text(quantity)
+    rows = [
+        [
+            mode_label(results, mode, names),
+            *(text(float(results[quantity + end].sel(mode=mode))) for end in ("", "_low", "_high")),
+        ]
+        for mode in _modes_shown(results, quantity)
+    ]
+    return Table(f"{_title(results, quantity)} by mode", ["mode", quantity, "low", "high"], rows)
+
+
+def _groups(results: xr.Dataset, group: str) -> list[tuple[int, int]]:
+    """Return each value of a group dim and how many levels it sums up."""
+    coord = results.attrs.get("levels_group", group)
+    return [(int(value), int((results[coord] == value).sum())) for value in results[group].values]
+
+
+def _text(quantity: str) -> Callable[[float], str]:
+    return share if quantity == "probability" else number
 
 
 def mode_label(results: xr.Dataset, mode: int, names: dict[str, str] | None = None) -> str:
     """Return a mode's number with its pair and its name in a publication."""
     pair = str(results["pair"].sel(mode=mode).item()) if "pair" in results.coords else ""
     published = (names or {}).get(str(mode))
-    extra = [f"pair {pair}"] if "-" in pair else []
-    extra += [f"published as {published}"] if published else []
-    return f"{mode} ({', '.join(extra)})" if extra else str(mode)
+    label = f"{mode} (pair {pair})" if "-" in pair else str(mode)
+    return f"{label}, paper {published}" if published else label
 
 
 def inputs_table(results: xr.Dataset) -> Table:
@@ -167,15 +207,6 @@ def inputs_table(results: xr.Dataset) -> Table:
 
 def _title(results: xr.Dataset, quantity: str) -> str:
     return str(results[quantity].attrs["long_name"]).capitalize()
-
-
-def _group_coord(results: xr.Dataset, group: str) -> str:
-    """Return the coord over the levels that the group dim sums up."""
-    values = set(results[group].values.tolist())
-    for name, coord in results.coords.items():
-        if coord.ndim == 1 and name not in results.dims and set(np.unique(coord.values).tolist()) == values:
-            return str(name)
-    return group
 
 
 def _modes_shown(results: xr.Dataset, quantity: str) -> list[int]:

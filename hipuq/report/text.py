@@ -33,7 +33,7 @@ def show_results(tree: xr.DataTree, console: Console | None = None) -> None:
                 screen.print(trust(results))
             if "mode" not in results.dims:
                 screen.print(escape(f"{of}: {headline(results)}"))
-            for table in tables(results, names):
+            for table in tables(results, names)[:1]:
                 screen.print(_rich(table))
 
 

@@ -1,0 +1,201 @@
+"""Eigenvalues in the plane: root locus over friction, damping ratio over frequency.
+
+Both are usual pictures of a complex eigenvalue analysis. Modes of one frequency range crowd
+together, so the closest cluster is shown enlarged in an inset.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from hipuq.cea import damping_ratio
+from hipuq.errors import InputError
+from hipuq.plots.friction_sweep import cluster
+from hipuq.plots.style import BORDER, COLOUR_MAP, GREY, SKY, STABLE, UNSTABLE, axis_label, new_axes
+from hipuq.plots.tracking import sorted_sweep
+
+Array = NDArray[np.float64]
+
+UNKNOWN: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": ":"}
+"""Line at the frequency of an undecided mode."""
+
+NEAR = (0.035, 0.06)
+"""Points nearer than this share one label (shares of the width and height of the axes)."""
+
+
+def root_locus(outcomes: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw growth rate over frequency of all modes, coloured by friction.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+        A friction sweep: ``friction`` over sample, ``frequency`` [Hz], ``growth_rate`` [1/s] and
+        ``unstable`` over (sample, mode). Undecided modes are left out, and the title says how many.
+    ax : Axes, optional
+        Where to draw; a new figure by default.
+
+    Returns
+    -------
+    Axes
+        The closest cluster of modes is enlarged in an inset, ``ax.child_axes[0]``.
+
+    Raises
+    ------
+    SchemaError, InputError
+        If the outcomes are no friction sweep.
+    """
+    sweep = sorted_sweep(outcomes)
+    frequency, growth = sweep["frequency"].values, sweep["growth_rate"].values
+    friction = np.broadcast_to(sweep["friction"].values[:, None], frequency.shape)
+    known = ~np.isnan(sweep["unstable"].values)
+    close = cluster(frequency[0]) | cluster(frequency[-1])
+    ax = new_axes(ax, 7.2, 4.8)
+    limits: dict[str, Any] = {
+        "vmin": float(friction.min()),
+        "vmax": float(friction.max()),
+        "cmap": COLOUR_MAP,
+    }
+    views = [(ax, known)]
+    if close.any():
+        views.append((ax.inset_axes((0.1, 0.61, 0.7, 0.32)), known & close))
+    for view, shown in views:
+        points = view.scatter(frequency[shown], growth[shown], c=friction[shown], s=7, linewidths=0, **limits)
+        view.axhline(_threshold(outcomes), zorder=0.5, **BORDER)
+        if view is ax:
+            bar = ax.get_figure(root=False).colorbar(points, ax=ax)  # type: ignore[union-attr]
+            bar.set_label(axis_label(sweep["friction"]))
+    if close.any():
+        _frame(ax, views[1][0], sweep["mode"].values[close])
+    undecided = int((~known).sum())
+    ax.set_title(f"{undecided} undecided of {known.size} not drawn" if undecided else "")
+    ax.set_xlabel(axis_label(sweep["frequency"]))
+    ax.set_ylabel(axis_label(sweep["growth_rate"]))
+    return ax
+
+
+def damping_over_frequency(
+    outcomes: xr.Dataset, friction: float | None = None, *, ax: Axes | None = None
+) -> Axes:
+    """Draw the damping ratio over frequency of all modes at one friction.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+        As for `root_locus`. Of an undecided mode only the frequency is drawn; a rigid mechanism, of
+        frequency 0, has no damping ratio.
+    friction : float, optional
+        Friction; the nearest one of the sweep is taken. The largest by default.
+    ax : Axes, optional
+        Where to draw; a new figure by default.
+
+    Returns
+    -------
+    Axes
+        The closest cluster of modes is enlarged in an inset, ``ax.child_axes[0]``.
+
+    Raises
+    ------
+    SchemaError, InputError
+        If the outcomes are no friction sweep, or the friction is not a number.
+    """
+    if friction is not None and not np.isfinite(friction):
+        raise InputError(f"friction is {friction}: it must be a finite number")
+    sweep = sorted_sweep(outcomes)
+    values = sweep["friction"].values
+    row = -1 if friction is None else int(np.abs(values - friction).argmin())
+    here = sweep.isel(sample=row)
+    frequency, unstable = here["frequency"].values, here["unstable"].values
+    ratio = damping_ratio(frequency, here["growth_rate"].values)
+    numbers = here["mode"].values
+    drawn = np.isfinite(ratio) & ~np.isnan(unstable)
+    close = cluster(frequency)
+    unknown = np.isnan(unstable)
+    ax = new_axes(ax, 7.2, 4.8)
+    _damping(ax, frequency, ratio, unstable, drawn)
+    ax.set_xlim(0.0, None)
+    ax.margins(y=0.12)
+    if close.any():
+        # Damped modes lie above the line, undamped ones on it: the lower half then is the free one.
+        half = "lower" if np.median(ratio[drawn]) > 0.1 * np.abs(ratio[drawn]).max() else "upper"
+        inset = ax.inset_axes((0.12, 0.62 if half == "upper" else 0.1, 0.64, 0.31))
+        _damping(inset, frequency, ratio, unstable, drawn & close)
+        for x in frequency[unknown & close]:
+            inset.axvline(x, **UNKNOWN)
+        inset.margins(0.12, 0.3)
+        _frame(ax, inset, numbers[close])
+        _label(inset, numbers[drawn & close], frequency[drawn & close], ratio[drawn & close])
+    _label(ax, numbers[drawn & ~close], frequency[drawn & ~close], ratio[drawn & ~close])
+    for x in frequency[unknown]:
+        ax.axvline(x, **UNKNOWN)
+    if unknown.any():
+        ax.plot([], [], label=f"undecided ({unknown.sum()})", **UNKNOWN)
+    rigid = int(((frequency == 0) & ~unknown).sum())
+    if rigid:
+        ax.plot([], [], linestyle="none", label=f"no damping ratio: {rigid} rigid mechanisms")
+    ax.set_title(f"{axis_label(sweep['friction'], '')} {values[row]:.4g}")
+    ax.set_xlabel(axis_label(sweep["frequency"]))
+    ax.set_ylabel("damping ratio [1]")
+    ax.legend(loc="lower left" if not close.any() or half == "upper" else "upper left", fontsize="small")
+    return ax
+
+
+def _damping(ax: Axes, frequency: Array, ratio: Array, unstable: Array, shown: NDArray[np.bool_]) -> None:
+    """Draw damping ratios by verdict."""
+    ax.axhline(0.0, zorder=0.5, **BORDER)
+    for verdict, style, label in ((0, STABLE, "stable"), (1, UNSTABLE, "unstable")):
+        part = shown & (unstable == verdict)
+        if part.any():
+            ax.plot(frequency[part], ratio[part], markersize=5, label=label, **style)
+
+
+def _label(ax: Axes, numbers: NDArray[np.intp], x: Array, y: Array) -> None:
+    """Write the mode numbers at points, away from 0; neighbours that lie on each other share a label."""
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    u, v = (x - left) / (right - left), (y - bottom) / (top - bottom)
+    groups: list[list[int]] = []
+    for i in range(len(numbers)):
+        for group in groups:
+            j = group[-1]
+            if abs(u[i] - u[j]) < NEAR[0] and abs(v[i] - v[j]) < NEAR[1]:
+                group.append(i)
+                break
+        else:
+            groups.append([i])
+    for group in groups:
+        text = _ranges([int(numbers[i]) for i in group])
+        centre = (float(np.mean(x[group])), float(np.mean(y[group])))
+        offset, side = ((0, 5), "bottom") if centre[1] >= 0 else ((0, -5), "top")
+        ax.annotate(text, centre, offset, textcoords="offset points", ha="center", va=side, fontsize="small")
+
+
+def _ranges(numbers: list[int]) -> str:
+    """Return ``"1-3, 5"`` for 1, 2, 3, 5."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
+
+
+def _frame(ax: Axes, inset: Axes, numbers: NDArray[np.int64]) -> None:
+    """Say what an inset enlarges, and shade that in the axes."""
+    inset.tick_params(labelsize="x-small")
+    inset.ticklabel_format(useOffset=False)
+    inset.locator_params(axis="x", nbins=5)
+    inset.set_title(f"modes {_ranges(numbers.tolist())} enlarged", fontsize="small")
+    ax.axvspan(*inset.get_xlim(), color=SKY, alpha=0.3, linewidth=0, zorder=0.3)
+
+
+def _threshold(outcomes: xr.Dataset) -> float:
+    """Return the growth rate above which a mode counts as unstable, 0 unless the model says so."""
+    options: dict[str, Any] = json.loads(outcomes.attrs.get("options") or "{}")
+    model = options.get("model", {})
+    return float(model.get("growth_threshold", 0.0)) if isinstance(model, dict) else 0.0
