@@ -66,6 +66,36 @@ def check_count(name: str, value: object, minimum: int = 1) -> int:
     raise InputError(f"{name} is {value!r}: it must be an integer of {minimum} or more")
 
 
+def check_size(sampler: str, n: int) -> None:
+    """Check that a sampler can make a design of n points.
+
+    Parameters
+    ----------
+    sampler : str
+        One of `SAMPLERS`.
+    n : int
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such sampler.
+    InputError
+        If n does not suit it.
+    """
+    if sampler not in SAMPLERS:
+        raise unknown_name("sampler", sampler, SAMPLERS)
+    if sampler == "latin_hypercube" and n > LATIN_HYPERCUBE_MAXIMUM:
+        raise InputError(
+            f"a latin hypercube of {n} points has to be made whole: at most "
+            f"{LATIN_HYPERCUBE_MAXIMUM}; take sampler 'random' or 'sobol'"
+        )
+    if sampler == "sobol" and n & (n - 1):
+        below = 1 << (n.bit_length() - 1)
+        raise InputError(
+            f"a Sobol design of {n} points is not balanced: take a power of 2, {below} or {2 * below}"
+        )
+
+
 def unit_points(sampler: str, n: int, dimension: int, seed: int, key: tuple[int, ...], rows: slice) -> Array:
     """Return rows of a design of n points in the unit cube.
 
@@ -94,29 +124,21 @@ def unit_points(sampler: str, n: int, dimension: int, seed: int, key: tuple[int,
     InputError
         If n does not suit the sampler.
     """
+    check_size(sampler, n)
     if sampler == "random":
         return _random(dimension, seed, key, rows)
     from scipy.stats import qmc
 
     rng = spawn(seed, *key)
     if sampler == "latin_hypercube":
-        if n > LATIN_HYPERCUBE_MAXIMUM:
-            raise InputError(
-                f"a latin hypercube of {n} points has to be made whole: at most "
-                f"{LATIN_HYPERCUBE_MAXIMUM}; take sampler 'random' or 'sobol'"
-            )
         return np.asarray(qmc.LatinHypercube(dimension, rng=rng).random(n))[rows]
-    if sampler == "sobol":
-        if n & (n - 1):
-            below = 1 << (n.bit_length() - 1)
-            raise InputError(
-                f"a Sobol design of {n} points is not balanced: take a power of 2, {below} or {2 * below}"
-            )
-        sequence = qmc.Sobol(dimension, scramble=True, rng=rng)
-        if rows.start:
-            sequence.fast_forward(rows.start)
+    sequence = qmc.Sobol(dimension, scramble=True, rng=rng)
+    if rows.start:
+        sequence.fast_forward(rows.start)
         return np.asarray(sequence.random(rows.stop - rows.start))
-    raise unknown_name("sampler", sampler, SAMPLERS)
+    # A first draw of other than a power of 2 points, as a slice may be, would warn: draw one first.
+    first = sequence.random(1)
+    return np.concatenate([first, sequence.random(rows.stop - 1)]) if rows.stop > 1 else first
 
 
 def _random(dimension: int, seed: int, key: tuple[int, ...], rows: slice) -> Array:

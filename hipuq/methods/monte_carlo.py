@@ -18,7 +18,7 @@ from hipuq.methods.base import rows_of, samples_by_block
 from hipuq.methods.intervals import check_confidence, student, wilson
 from hipuq.methods.reduction import Moments, moments
 from hipuq.methods.results import Kind, finished, kind_of, labelled, levels_of, with_summaries
-from hipuq.sampling import SAMPLERS, Seed, check_count, seed_of, unit_points
+from hipuq.sampling import SAMPLERS, Seed, check_count, check_size, seed_of, unit_points
 
 Array = NDArray[np.float64]
 
@@ -140,12 +140,13 @@ def _plan(
     inputs: Inputs, n: int, sampler: str, stratify: str | bool, replicates: int | None
 ) -> tuple[int, int, xr.Dataset | None]:
     """Return samples for each replicate, replicates, and the levels of the strata."""
+    n = check_count("n", n)
     if sampler not in SAMPLERS:
         raise unknown_name("sampler", sampler, SAMPLERS)
-    n = check_count("n", n)
     parts = REPLICATES[sampler] if replicates is None else check_count("replicates", replicates)
     if n % parts:
         raise InputError(f"n is {n}: it must be a multiple of the {parts} replicates")
+    check_size(sampler, n // parts)
     name, _ = _stratum(inputs, stratify)
     return n // parts, parts, inputs.levels(name) if name else None
 

@@ -7,6 +7,7 @@ friction and numbered as where most are unstable first, see `hipuq.plots.follow_
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from hipuq.errors import InputError
 from hipuq.plots.style import BLACK, BORDER, GREY, LINES, UNDECIDED, axis_label, new_axes, new_panels
-from hipuq.plots.tracking import bracket, check_modes, follow_modes
+from hipuq.plots.tracking import bracket, check_modes, follow_modes, growth_threshold
 
 CLOSE = 0.005
 """Share of the frequency range: modes nearer than that to the next one form a cluster."""
@@ -108,12 +109,13 @@ def lock_in(
     sweep = follow_modes(outcomes)
     for pair in pairs:
         check_modes(sweep, list(pair))
-    axes = new_panels(figure, 2, len(pairs), (4.8 * len(pairs), 6.0), sharex=True)
+    axes = new_panels(figure, 2, len(pairs), (4.8 * len(pairs), 6.4), sharex=True)
     for i, pair in enumerate(pairs):
         for ax, name in zip(axes[:, i], ("frequency", "growth_rate"), strict=True):
             _draw(ax, sweep, name, pair)
         axes[0, i].set_title(f"({chr(ord('a') + i)}) modes {' and '.join(str(mode) for mode in pair)}")
         axes[0, i].set_xlabel("")
+        _legend_below(axes[1, i])
     return axes
 
 
@@ -142,7 +144,7 @@ def dispersion(outcomes: xr.Dataset, *, axes: Sequence[Axes] | NDArray[Any] | No
     close = cluster(frequency[0]) | cluster(frequency[-1])
     if axes is None:
         panels = 3 if close.any() else 2
-        axes = new_panels(None, panels, 1, (6.4, 2.6 * panels), sharex=True)[:, 0]
+        axes = new_panels(None, panels, 1, (6.4, 2.6 * panels + 0.6), sharex=True)[:, 0]
     axes = np.asarray(axes, dtype=object)
     if axes.shape not in ((2,), (3,)):
         raise InputError(f"axes has the shape {axes.shape}: dispersion needs two or three Axes")
@@ -164,12 +166,13 @@ def dispersion(outcomes: xr.Dataset, *, axes: Sequence[Axes] | NDArray[Any] | No
             numbers = sweep["mode"].values[close]
             axes[2].set_title(f"modes {numbers[0]} to {numbers[-1]} enlarged", fontsize="medium")
     axes[-1].set_xlabel(axis_label(sweep["friction"]))
-    axes[0].axhline(0.0, zorder=0.5, **BORDER)
+    axes[0].axhline(growth_threshold(sweep), zorder=0.5, **BORDER)
     if (~ever).any():
         axes[0].plot([], [], color=GREY, linewidth=0.8, label="never unstable")
     for ax in axes:
         _shade(ax, friction, np.isnan(sweep["unstable"].values).any(axis=1))
-    axes[0].legend(loc="upper left", fontsize="small")
+    handles, labels = axes[0].get_legend_handles_labels()
+    _legend_below(axes[-1], handles, labels)
     return axes
 
 
@@ -202,6 +205,7 @@ def _over_friction(outcomes: xr.Dataset, name: str, modes: Sequence[int], ax: Ax
     check_modes(sweep, list(modes))
     ax = new_axes(ax)
     _draw(ax, sweep, name, modes)
+    _legend_below(ax)
     return ax
 
 
@@ -222,22 +226,32 @@ def _draw(ax: Axes, sweep: xr.Dataset, name: str, modes: Sequence[int]) -> None:
                 points = chosen[name].values[few, j]
                 ax.plot(friction[few], points, markersize=4, markeredgewidth=0.8, **UNDECIDED)
     if name == "growth_rate":
-        ax.axhline(0.0, zorder=0.5, **BORDER)
+        ax.axhline(growth_threshold(sweep), zorder=0.5, **BORDER)
     for mode in modes:
         _mark_lock_in(ax, sweep, mode)
     ax.set_xlabel(axis_label(sweep["friction"]))
     ax.set_ylabel(axis_label(sweep[name]))
-    ax.legend(loc="upper left" if name == "growth_rate" else "best", fontsize="small")
 
 
 def _mark_lock_in(ax: Axes, sweep: xr.Dataset, mode: int) -> None:
-    """Mark the friction at which a mode locks in, if it does."""
+    """Mark the friction at which a mode locks in, or becomes unstable despite damping, if it does."""
     low, high = bracket(sweep, mode)
     if np.isnan(high):
         return
-    label = f"lock-in at {low:.4g} to {high:.4g}" if low < high else f"unstable from {high:.4g}"
-    start = low if low < high else high
+    start, label = high, f"mode {mode}: unstable from {high:.4g}"
+    if low < high:
+        before = sweep["growth_rate"].sel(mode=mode).values[sweep["friction"].values == low]
+        what = "lock-in" if (before == 0).all() else "onset"
+        digits = max(4, math.ceil(-math.log10(high - low) - 1e-6))
+        start, label = low, f"mode {mode}: {what} between {low:.{digits}f} and {high:.{digits}f}"
     ax.axvspan(start, high, facecolor="none", edgecolor=BLACK, linewidth=0.8, zorder=0.6, label=label)
+
+
+def _legend_below(ax: Axes, *entries: Any) -> None:
+    """Put the legend under the label of the x axis, where it hides nothing."""
+    ax.legend(
+        *entries, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2, frameon=False, fontsize="small"
+    )
 
 
 def _shade(ax: Axes, friction: NDArray[np.float64], where: NDArray[np.bool_]) -> None:

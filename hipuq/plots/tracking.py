@@ -8,6 +8,8 @@ the pairs that can lock in have all done so there, and have not yet passed each 
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -132,6 +134,22 @@ def check_modes(sweep: xr.Dataset, modes: list[int]) -> None:
     for mode in modes:
         if mode not in allowed:
             raise InputError(f"mode {mode} is not in the sweep: it must be one of {allowed}")
+
+
+def growth_threshold(outcomes: xr.Dataset) -> float:
+    """Return the growth rate above which a mode counts as unstable [1/s].
+
+    Parameters
+    ----------
+    outcomes : Dataset
+        With the model's options in its attributes; 0 is assumed where they are missing.
+
+    Returns
+    -------
+    float
+    """
+    model = json.loads(outcomes.attrs.get("options") or "{}").get("model")
+    return float(model.get("growth_threshold", 0.0)) if isinstance(model, dict) else 0.0
 
 
 def sorted_sweep(outcomes: xr.Dataset) -> xr.Dataset:

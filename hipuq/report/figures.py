@@ -93,8 +93,8 @@ def _sweep(analysis: str, sweep: xr.Dataset, options: dict[str, list[tuple[int, 
         yield Picture(
             analysis, "lock_in", f"Mode coupling: frequency and growth rate {at}, with the lock-in.", figure
         )
-    figure = Figure(figsize=(10, 7), layout="constrained")
-    plots.dispersion(sweep, axes=figure.subplots(2, 1, sharex=True))
+    figure = Figure(figsize=(10, 10), layout="constrained")
+    plots.dispersion(sweep, axes=figure.subplots(3, 1, sharex=True))
     yield Picture(
         analysis,
         "dispersion",

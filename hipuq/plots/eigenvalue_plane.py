@@ -6,26 +6,26 @@ together, so the closest cluster is shown enlarged in an inset.
 
 from __future__ import annotations
 
-import json
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
 from numpy.typing import NDArray
 
 from hipuq.cea import damping_ratio
 from hipuq.errors import InputError
 from hipuq.plots.friction_sweep import cluster
 from hipuq.plots.style import BORDER, COLOUR_MAP, GREY, SKY, STABLE, UNSTABLE, axis_label, new_axes
-from hipuq.plots.tracking import sorted_sweep
+from hipuq.plots.tracking import growth_threshold, sorted_sweep
 
 Array = NDArray[np.float64]
 
 UNKNOWN: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": ":"}
 """Line at the frequency of an undecided mode."""
 
-NEAR = (0.035, 0.06)
+NEAR = (0.05, 0.06)
 """Points nearer than this share one label (shares of the width and height of the axes)."""
 
 
@@ -56,22 +56,19 @@ def root_locus(outcomes: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     known = ~np.isnan(sweep["unstable"].values)
     close = cluster(frequency[0]) | cluster(frequency[-1])
     ax = new_axes(ax, 7.2, 4.8)
-    limits: dict[str, Any] = {
-        "vmin": float(friction.min()),
-        "vmax": float(friction.max()),
-        "cmap": COLOUR_MAP,
-    }
-    views = [(ax, known)]
+    limits: dict[str, Any] = {"vmin": friction.min(), "vmax": friction.max(), "cmap": COLOUR_MAP}
+
+    def draw(view: Axes, shown: NDArray[np.bool_]) -> PathCollection:
+        view.axhline(growth_threshold(sweep), zorder=0.5, **BORDER)
+        return view.scatter(frequency[shown], growth[shown], c=friction[shown], s=7, linewidths=0, **limits)
+
+    points = draw(ax, known)
+    bar = ax.figure.colorbar(points, ax=ax)
+    bar.set_label(axis_label(sweep["friction"]))
     if close.any():
-        views.append((ax.inset_axes((0.1, 0.61, 0.7, 0.32)), known & close))
-    for view, shown in views:
-        points = view.scatter(frequency[shown], growth[shown], c=friction[shown], s=7, linewidths=0, **limits)
-        view.axhline(_threshold(outcomes), zorder=0.5, **BORDER)
-        if view is ax:
-            bar = ax.get_figure(root=False).colorbar(points, ax=ax)  # type: ignore[union-attr]
-            bar.set_label(axis_label(sweep["friction"]))
-    if close.any():
-        _frame(ax, views[1][0], sweep["mode"].values[close])
+        inset, _ = _inset(ax, growth[known & ~close])
+        draw(inset, known & close)
+        _frame(ax, inset, sweep["mode"].values[close])
     undecided = int((~known).sum())
     ax.set_title(f"{undecided} undecided of {known.size} not drawn" if undecided else "")
     ax.set_xlabel(axis_label(sweep["frequency"]))
@@ -120,16 +117,16 @@ def damping_over_frequency(
     _damping(ax, frequency, ratio, unstable, drawn)
     ax.set_xlim(0.0, None)
     ax.margins(y=0.12)
+    corner: Literal["lower left", "upper left"] = "lower left"
     if close.any():
-        # Damped modes lie above the line, undamped ones on it: the lower half then is the free one.
-        half = "lower" if np.median(ratio[drawn]) > 0.1 * np.abs(ratio[drawn]).max() else "upper"
-        inset = ax.inset_axes((0.12, 0.62 if half == "upper" else 0.1, 0.64, 0.31))
+        inset, upper = _inset(ax, ratio[drawn & ~close])
+        corner = "lower left" if upper else "upper left"
         _damping(inset, frequency, ratio, unstable, drawn & close)
         for x in frequency[unknown & close]:
             inset.axvline(x, **UNKNOWN)
         inset.margins(0.12, 0.3)
         _frame(ax, inset, numbers[close])
-        _label(inset, numbers[drawn & close], frequency[drawn & close], ratio[drawn & close])
+        _label(inset, numbers[drawn & close], frequency[drawn & close], ratio[drawn & close], beside=True)
     _label(ax, numbers[drawn & ~close], frequency[drawn & ~close], ratio[drawn & ~close])
     for x in frequency[unknown]:
         ax.axvline(x, **UNKNOWN)
@@ -137,12 +134,27 @@ def damping_over_frequency(
         ax.plot([], [], label=f"undecided ({unknown.sum()})", **UNKNOWN)
     rigid = int(((frequency == 0) & ~unknown).sum())
     if rigid:
-        ax.plot([], [], linestyle="none", label=f"no damping ratio: {rigid} rigid mechanisms")
+        ax.plot(
+            [], [], linestyle="none", label=f"no damping ratio: {rigid} rigid mechanism{'s' * (rigid > 1)}"
+        )
     ax.set_title(f"{axis_label(sweep['friction'], '')} {values[row]:.4g}")
     ax.set_xlabel(axis_label(sweep["frequency"]))
     ax.set_ylabel("damping ratio [1]")
-    ax.legend(loc="lower left" if not close.any() or half == "upper" else "upper left", fontsize="small")
+    ax.legend(loc=corner, fontsize="small")
     return ax
+
+
+def _inset(ax: Axes, outside: Array) -> tuple[Axes, bool]:
+    """Return an inset above or below the heights `outside` and 0, where there is more room.
+
+    And whether it is the upper one.
+    """
+    bottom, top = ax.get_ylim()
+    heights = (np.append(outside, 0.0) - bottom) / (top - bottom)
+    room = 1 - heights.max(), heights.min()
+    upper = bool(room[0] >= room[1] - 1e-9)
+    height = float(np.clip(max(room) - 0.18, 0.15, 0.34))
+    return ax.inset_axes((0.12, 0.93 - height if upper else 0.09, 0.66, height)), upper
 
 
 def _damping(ax: Axes, frequency: Array, ratio: Array, unstable: Array, shown: NDArray[np.bool_]) -> None:
@@ -154,14 +166,14 @@ def _damping(ax: Axes, frequency: Array, ratio: Array, unstable: Array, shown: N
             ax.plot(frequency[part], ratio[part], markersize=5, label=label, **style)
 
 
-def _label(ax: Axes, numbers: NDArray[np.intp], x: Array, y: Array) -> None:
-    """Write the mode numbers at points, away from 0; neighbours that lie on each other share a label."""
+def _label(ax: Axes, numbers: NDArray[np.int64], x: Array, y: Array, *, beside: bool = False) -> None:
+    """Write mode numbers above points, or beside them; points that lie on each other share a label."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     u, v = (x - left) / (right - left), (y - bottom) / (top - bottom)
     groups: list[list[int]] = []
     for i in range(len(numbers)):
         for group in groups:
-            j = group[-1]
+            j = group[0]
             if abs(u[i] - u[j]) < NEAR[0] and abs(v[i] - v[j]) < NEAR[1]:
                 group.append(i)
                 break
@@ -170,8 +182,10 @@ def _label(ax: Axes, numbers: NDArray[np.intp], x: Array, y: Array) -> None:
     for group in groups:
         text = _ranges([int(numbers[i]) for i in group])
         centre = (float(np.mean(x[group])), float(np.mean(y[group])))
-        offset, side = ((0, 5), "bottom") if centre[1] >= 0 else ((0, -5), "top")
-        ax.annotate(text, centre, offset, textcoords="offset points", ha="center", va=side, fontsize="small")
+        style: dict[str, Any] = {"ha": "left", "va": "center"} if beside else {"ha": "center", "va": "bottom"}
+        offset = (5, 0) if beside else (0, 5)
+        style["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.3}
+        ax.annotate(text, centre, offset, textcoords="offset points", fontsize="small", zorder=1.8, **style)
 
 
 def _ranges(numbers: list[int]) -> str:
@@ -192,10 +206,3 @@ def _frame(ax: Axes, inset: Axes, numbers: NDArray[np.int64]) -> None:
     inset.locator_params(axis="x", nbins=5)
     inset.set_title(f"modes {_ranges(numbers.tolist())} enlarged", fontsize="small")
     ax.axvspan(*inset.get_xlim(), color=SKY, alpha=0.3, linewidth=0, zorder=0.3)
-
-
-def _threshold(outcomes: xr.Dataset) -> float:
-    """Return the growth rate above which a mode counts as unstable, 0 unless the model says so."""
-    options: dict[str, Any] = json.loads(outcomes.attrs.get("options") or "{}")
-    model = options.get("model", {})
-    return float(model.get("growth_threshold", 0.0)) if isinstance(model, dict) else 0.0

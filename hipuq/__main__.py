@@ -1,0 +1,5 @@
+"""``python -m hipuq`` is the command line."""
+
+from hipuq.cli import main
+
+main()

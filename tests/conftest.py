@@ -1,0 +1,13 @@
+"""Settings of the tests: helper modules beside them can be imported, property tests repeat exactly."""
+
+import sys
+from pathlib import Path
+
+from hypothesis import settings
+
+# pytest runs with import mode "importlib", which leaves sys.path alone.
+sys.path.insert(0, str(Path(__file__).parent))
+
+# Derandomised: a failure in one run is a failure in every run. No database: no files left behind.
+settings.register_profile("hipuq", deadline=None, max_examples=50, derandomize=True, database=None)
+settings.load_profile("hipuq")
