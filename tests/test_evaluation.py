@@ -207,5 +207,5 @@ def test_wrong_options_are_named():
         hipuq.evaluate(model, samples, keep=[])
     with pytest.raises(InputError, match="n_jobs is 0"):
         hipuq.evaluate(model, samples, n_jobs=0)
-    with pytest.raises(InputError, match="must be a concurrent.futures.Executor"):
+    with pytest.raises(InputError, match=r"must be a concurrent\.futures\.Executor"):
         hipuq.evaluate(model, samples, executor="threads")

@@ -76,7 +76,7 @@ def test_energies_balance(name):
     Both parts of y^H (l^2 M + l C + K0 + mu K1) y = 0 with l = g + i w and y^H M y = 1.
     """
     shapes = mode_shapes(CASES[name])
-    mass, damping, stiffness, friction = matrices(CASES[name])
+    _, damping, _, friction = matrices(CASES[name])
     moving = shapes.eigenvalue.imag > 0
     assert moving.sum() >= 2
     g, w, y = shapes.eigenvalue.real[moving], shapes.eigenvalue.imag[moving], shapes.shape[moving]

@@ -110,7 +110,7 @@ def test_a_mode_is_never_more_probable_than_any_mode(hip):
 
 
 def test_overall_is_the_weighted_mean(hip):
-    inputs, samples, outcomes = hip
+    inputs, _, outcomes = hip
     results = hipuq.estimate("monte_carlo", outcomes, inputs, of="any_unstable")
     weighted = (results["weight"] * results["probability"]).sum()
     assert float(results["probability_overall"]) == pytest.approx(float(weighted))
@@ -149,13 +149,13 @@ def test_certified_means_of_the_study_are_covered(preset):
             assert float(one["probability_low"]) <= exact <= float(one["probability_high"])
 
 
-def test_a_stratum_needs_no_other_input():
+@pytest.mark.parametrize("sampler", ["random", "latin_hypercube", "sobol"])
+def test_a_stratum_needs_no_other_input(sampler):
     """Contact as the only uncertain parameter: the levels are the whole design."""
     model = hipuq.models.ring(friction=0.05)
     inputs = model.inputs(contact=hipuq.ContactPatterns((8, 9)))
-    results = hipuq.run(
-        model, inputs, method="monte_carlo", n=1, of="any_unstable", rng=1, stratify="contact"
-    )
+    options = {"n": 8, "rng": 1, "stratify": "contact", "sampler": sampler}
+    results = hipuq.run(model, inputs, method="monte_carlo", of="any_unstable", **options)
     assert results.sizes["pattern"] == 10
     assert (results["probability"] == 1).all()
 

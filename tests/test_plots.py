@@ -228,7 +228,7 @@ def test_mode_shape_is_scaled(shapes):
     ax = plots.mode_shape(shapes, 18)
     start = np.array(line(ax, "undeformed").get_data()).T
     np.testing.assert_array_equal(start, shapes["position"])
-    end = np.array(line(ax, "deformed, largest displacement drawn as 0.25 radii").get_data()).T
+    end = np.array(line(ax, "deformed (largest: 0.25 radii)").get_data()).T
     moved = end - start
     length = np.hypot(*moved.T)
     assert length.max() == pytest.approx(0.25)
@@ -242,9 +242,7 @@ def test_mode_shape_is_scaled(shapes):
 
 
 def test_mode_shape_of_other_scale_and_no_motion(shapes):
-    assert "deformed, largest displacement drawn as 0.5 radii" in labels(
-        plots.mode_shape(shapes, 1, scale=0.5)
-    )
+    assert "deformed (largest: 0.5 radii)" in labels(plots.mode_shape(shapes, 1, scale=0.5))
     drawn(plots.mode_shape(shapes.assign(displacement_real=0 * shapes["displacement_real"]), 1))
 
 

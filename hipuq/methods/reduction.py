@@ -68,9 +68,11 @@ class Moments:
         size = self.size.reshape(self.size.shape + (1,) * (self.known.ndim - self.size.ndim))
         size = np.broadcast_to(size, self.known.shape)
         missing = size - self.known
-        filled = (self.total + missing * value) / size
+        # An empty group stays empty: its mean is missing, not 0 / 0.
+        draws = np.where(size > 0, size, np.nan)
+        filled = (self.total + missing * value) / draws
         delta = np.where(self.known > 0, value - np.nan_to_num(self.mean), 0.0)
-        squares = self.squares + np.square(delta) * self.known * missing / size
+        squares = self.squares + np.nan_to_num(np.square(delta) * self.known * missing / draws)
         return Moments(self.size, size, filled, squares)
 
 

@@ -65,7 +65,7 @@ def mode_shape(shapes: xr.Dataset, mode: int, *, ax: Axes | None = None, scale: 
     arc = np.linspace(turn[0], turn[-1], 181)
     ax.plot(SOCKET * np.cos(arc), SOCKET * np.sin(arc), color=BLACK, linewidth=0.8, label="socket")
     ax.plot(*start.T, "o--", color=GREY, markerfacecolor="white", linewidth=0.8, label="undeformed")
-    label = f"deformed, largest displacement drawn as {scale:g} radii"
+    label = f"deformed (largest: {scale:g} radii)"
     ax.plot(*end.T, "s-", color=VERMILLION, markersize=5, label=label)
     ax.quiver(
         *start.T,
@@ -90,5 +90,6 @@ def mode_shape(shapes: xr.Dataset, mode: int, *, ax: Axes | None = None, scale: 
     ax.set_title(f"mode {mode}: {frequency:.1f} Hz, growth rate {growth + 0.0:.3g} 1/s")
     ax.set_xlabel("x [radii]")
     ax.set_ylabel("y [radii]")
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3, frameon=False, fontsize="small")
+    # Inside the ring, where nothing is drawn.
+    ax.legend(loc="center", bbox_to_anchor=(0.5, 0.66), frameon=False, fontsize="small")
     return ax

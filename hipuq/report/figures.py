@@ -73,7 +73,7 @@ def _mode_shapes(
     analysis: str, shapes: xr.Dataset, options: dict[str, list[int]], names: dict[int, str]
 ) -> Picture:
     modes = options["mode_shapes"]
-    figure = Figure(figsize=(5.5 * len(modes), 5), layout="constrained")
+    figure = Figure(figsize=(6 * len(modes), 4.2), layout="constrained")
     for mode, ax in zip(modes, figure.subplots(1, len(modes), squeeze=False)[0], strict=True):
         plots.mode_shape(shapes, mode, ax=ax)
     called = [f"mode {mode} is published as mode {names[mode]}" for mode in modes if mode in names]

@@ -67,7 +67,8 @@ def headline(results: xr.Dataset) -> str:
     quantity = "probability" if "probability" in results else "mean"
     for key in (f"{quantity}_overall", quantity):
         if key in results and results[key].ndim == 0:
-            return f"{results[key].attrs['long_name']}: {interval(results, key)}"
+            name = str(results[key].attrs["long_name"])
+            return f"{name[:1].upper()}{name[1:]}: {interval(results, key)}"
     return ""
 
 
@@ -118,17 +119,18 @@ def _by_group(results: xr.Dataset, quantity: str) -> Table:
         rows.append([str(value), str(size), mean, f"{low} to {high}", least, most, weighted])
     heading = str(results[group].attrs.get("long_name", group))
     columns = [heading, "levels", "mean", "interval", "minimum", "maximum", "weighted mean"]
-    return Table(f"{_title(results, quantity)}, over the levels of each group", columns, rows)
+    return Table(f"{_title(results, quantity)}; over the levels of each group", columns, rows)
 
 
 def _by_mode_and_group(results: xr.Dataset, quantity: str, names: dict[str, str] | None) -> list[Table]:
-    """Return mean and range, and the interval of the mean, a row for each mode."""
+    """Return mean, range and the interval of the mean, a row for each mode."""
     text = _text(quantity)
     group = next(str(dim) for dim in results[f"{quantity}_mean"].dims if dim != "mode")
     groups = _groups(results, group)
     heading = str(results[group].attrs.get("long_name", group))
     forms = {
-        "mean (minimum to maximum)": ("{0} ({1} to {2})", ("mean", "min", "max")),
+        "mean": ("{0}", ("mean",)),
+        "minimum to maximum": ("{0} to {1}", ("min", "max")),
         "interval of the mean": ("{0} to {1}", ("mean_low", "mean_high")),
     }
     made = []
@@ -143,9 +145,11 @@ def _by_mode_and_group(results: xr.Dataset, quantity: str, names: dict[str, str]
             rows.append([mode_label(results, mode, names), *cells])
         columns = [
             "mode",
-            *(f"{value} {heading}" if i == 0 else str(value) for i, (value, _) in enumerate(groups)),
+            *(f"{value} {heading.removeprefix('oscillators ')}" for value, _ in groups),
         ]
-        made.append(Table(f"{_title(results, quantity)}: {title}", columns, rows))
+        made.append(
+            Table(f"{_title(results, quantity)}; {title} over the levels of each group", columns, rows)
+        )
     return made
 
 

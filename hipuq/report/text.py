@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 
 import xarray as xr
 from rich.console import Console
@@ -32,7 +33,7 @@ def show_results(tree: xr.DataTree, console: Console | None = None) -> None:
                 screen.print(f"\n[bold]{escape(analysis)}[/bold]: {escape(line)}")
                 screen.print(trust(results))
             if "mode" not in results.dims:
-                screen.print(escape(f"{of}: {headline(results)}"))
+                screen.print(escape(headline(results)))
             for table in tables(results, names)[:1]:
                 screen.print(_rich(table))
 
@@ -45,7 +46,8 @@ def _is_wide() -> bool:
 def _rich(table: Table) -> RichTable:
     made = RichTable(title=escape(table.title), title_justify="left", title_style="none", box=None)
     for i, column in enumerate(table.columns):
-        made.add_column(escape(column), justify="left" if i == 0 else "right")
+        heading = "\n".join(textwrap.wrap(column, 10))
+        made.add_column(escape(heading), justify="left" if i == 0 else "right", no_wrap=True)
     for row in table.rows:
         made.add_row(*map(escape, row))
     return made
