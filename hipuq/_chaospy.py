@@ -67,11 +67,22 @@ def ppf(distribution: Any, u: Array) -> Array:
     return flat.reshape(np.shape(u))
 
 
+def adds_up(distribution: Any) -> bool:
+    """Say whether the cumulative probability reaches 1 at the upper end.
+
+    That of ``Trunc`` with both ends does not in chaospy 4.3, and its quantiles are as wrong.
+    """
+    return bool(abs(float(distribution.cdf(distribution.upper)[0]) - 1) < 1e-9)
+
+
 def cdf(distribution: Any, x: Array) -> Array:
     """Return the cumulative probability at `x`, any shape."""
-    at = np.floor(x) if distribution.interpret_as_integer else x
-    flat = np.asarray(distribution.cdf(np.ravel(at)), dtype=np.float64)
-    return flat.reshape(np.shape(x))
+    at = np.floor(x) if distribution.interpret_as_integer else np.asarray(x, dtype=np.float64)
+    # Outside its support chaospy's formulas can give NaN.
+    lower, upper = support(distribution)
+    flat = np.asarray(distribution.cdf(np.ravel(at.clip(lower, upper))), dtype=np.float64)
+    inside = flat.reshape(np.shape(x))
+    return np.where(at < lower, 0.0, np.where(at >= upper, 1.0, inside))
 
 
 def to_dict(distribution: Any) -> dict[str, Any]:

@@ -85,7 +85,9 @@ class ContactPatterns:
             raise InputError(f"weights are {values.tolist()}: they must not be negative, and not all 0")
         if len(values) == len(order):
             values = values[order]
-        return tuple((values / values.sum()).tolist())
+        # Weights that are normalised but for rounding stay as they are: a description rebuilds its own.
+        total = values.sum()
+        return tuple((values if abs(total - 1) < 1e-14 else values / total).tolist())
 
     @property
     def sizes(self) -> NDArray[np.int64]:

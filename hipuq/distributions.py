@@ -97,8 +97,11 @@ def as_distribution(value: object, name: str = "distribution") -> Distribution:
                 "or an object with ppf"
             )
         _check_quantiles(found, name)
-    except AssertionError as error:
-        # chaospy checks its arguments by assert, some of them on first use only.
+    except InputError:
+        raise
+    except (AssertionError, ValueError) as error:
+        # chaospy checks its arguments by assert, some of them on first use only; scipy's quantiles
+        # of several variables do not broadcast.
         raise InputError(f"{name} is {value!r}, which cannot be used: {error}") from error
     return found
 
@@ -129,6 +132,11 @@ def _from_chaospy(value: Any, name: str) -> Distribution:
         raise InputError(
             f"{name} is a joint distribution of {_chaospy.length(value)} variables: "
             "give each parameter a distribution of its own"
+        )
+    if not _chaospy.adds_up(value):
+        raise InputError(
+            f"{name} is {value!r}, whose probabilities do not add up to 1 in chaospy: it truncates rightly "
+            "at one end only, so nest two, Trunc(Trunc(..., lower=a), upper=b), or take TruncNormal"
         )
     try:
         description = {"kind": "chaospy", **_chaospy.to_dict(value)}

@@ -33,6 +33,18 @@ def norms(matrices: Array) -> Array:
     return norm
 
 
+def scales(matrices: Array, mechanisms: NDArray[np.intp]) -> Array:
+    """Return the scale of the eigenvalues other than mechanisms: their mean, (s,).
+
+    Where divergence makes them add up to nearly nothing, the norm over the root of their number.
+    """
+    rest = matrices.shape[1] - mechanisms
+    mean = np.trace(matrices, axis1=1, axis2=2) / rest
+    size = np.maximum(norms(matrices) / np.sqrt(rest), np.finfo(np.float64).tiny)
+    scale: Array = np.where(mean > 1e-3 * size, mean, size)
+    return scale
+
+
 def conditioned_eigenvalues(matrices: Array) -> tuple[Complex, Array]:
     """Return eigenvalues and their first-order error bounds.
 
@@ -51,6 +63,8 @@ def conditioned_eigenvalues(matrices: Array) -> tuple[Complex, Array]:
         SAFETY * eps * norm * condition number, infinite where the eigenvectors are dependent.
     """
     values, right = np.linalg.eig(matrices)
+    # Real where all samples of the batch are real: the inverse must not depend on the company.
+    right = right.astype(np.complex128)
     try:
         left = np.linalg.inv(right)
     except np.linalg.LinAlgError:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.bounds import EPS, FILTER, Complex, conditioned_eigenvalues, norms
+from hipuq.cea.bounds import EPS, FILTER, Complex, conditioned_eigenvalues, norms, scales
 from hipuq.cea.pencils import Array
 
 Mask = NDArray[np.bool_]
+
+TIE = 1e-9
+"""Frequencies this close, relative to the largest, are equal but for rounding."""
 
 
 def damped_modes(
@@ -53,8 +56,7 @@ def damped_modes(
         known[rows, m:] = certain & taken[:, None]
         known[rows, :m] = taken[:, None]
         largest[rows] = growth[rows, m:].max(axis=1)
-    mean = np.abs(np.trace(stiffness, axis1=1, axis2=2)) / (n - mechanisms)
-    return frequency, growth, known, (threshold - largest) / np.sqrt(mean)
+    return frequency, growth, known, (threshold - largest) / np.sqrt(scales(stiffness, mechanisms))
 
 
 def _state_space_modes(stiffness: Array, damping: Array, threshold: float) -> tuple[Array, Array, Mask]:
@@ -80,6 +82,11 @@ def _state_space_modes(stiffness: Array, damping: Array, threshold: float) -> tu
     values, known = np.take_along_axis(values, order, 1), np.take_along_axis(known, order, 1)
     values *= rate[:, None]
     order = np.lexsort((values.real, values.imag), axis=1)
+    # Members of a coalesced pair differ in frequency by rounding only: the decaying one comes first.
+    ordered = np.take_along_axis(values, order, 1)
+    close = np.diff(ordered.imag, axis=1) <= TIE * ordered.imag[:, -1:]
+    rows, first = np.nonzero(close & (ordered.imag[:, :-1] > 0) & (np.diff(ordered.real, axis=1) < 0))
+    order[rows, first], order[rows, first + 1] = order[rows, first + 1], order[rows, first]
     values, known = np.take_along_axis(values, order, 1), np.take_along_axis(known, order, 1)
     return values.imag / (2 * np.pi), values.real, known
 

@@ -25,7 +25,7 @@ class ModeShapes:
     strain_energy : (n,) array
         Mean over a cycle of the energy in the frictionless springs, ``y^H K0 y / 4`` [J].
     kinetic_energy : (n,) array
-        Mean over a cycle, ``|l|^2 y^H M y / 4`` [J].
+        Mean over a cycle, ``Im(l)^2 y^H M y / 4`` [J].
     friction_work : (n,) array
         Work of friction in one cycle, ``-pi Im(y^H mu K1 y)`` [J]: positive feeds the vibration.
     damping_work : (n,) array
@@ -45,7 +45,7 @@ def mode_shapes(pencils: Pencils) -> ModeShapes:
 
     Energies are those of the motion ``Re(y exp(i Im(l) t))``, that is with growth frozen over the
     cycle. The balance of an undamped mode is exact: friction work = 8 pi (Re l / Im l) times the
-    mean kinetic energy at that frequency (take the imaginary part of ``y^H (l^2 M + K) y = 0``).
+    mean kinetic energy (take the imaginary part of ``y^H (l^2 M + K) y = 0``).
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def mode_shapes(pencils: Pencils) -> ModeShapes:
         eigenvalue=values,
         shape=shape,
         strain_energy=_form(shape, pencils.stiffness[0]).real / 4,
-        kinetic_energy=np.square(np.abs(values)) / 4,
+        kinetic_energy=np.square(values.imag) / 4,
         friction_work=-np.pi * _form(shape, friction).imag,
         damping_work=-np.pi * values.imag * _form(shape, damping).real,
     )

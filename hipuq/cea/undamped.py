@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.bounds import FILTER, ZERO, Complex, conditioned_eigenvalues, norms
+from hipuq.cea.bounds import FILTER, ZERO, Complex, conditioned_eigenvalues, norms, scales
 from hipuq.cea.pencils import Array
 
 Mask = NDArray[np.bool_]
@@ -53,12 +53,11 @@ def undamped_modes(
     frequency, growth, known = (
         np.take_along_axis(part, order, axis=1) for part in (frequency, growth, known)
     )
-    trace = np.trace(stiffness, axis1=1, axis2=2)
-    mean = np.abs(trace) / (stiffness.shape[1] - mechanisms)
+    scale = scales(stiffness, mechanisms)
     if threshold == 0:
-        margin = _gap_margin(values, rigid, mean)
+        margin = _gap_margin(values, rigid, scale)
     else:
-        margin = (threshold - growth.max(axis=1)) / np.sqrt(mean)
+        margin = (threshold - growth.max(axis=1)) / np.sqrt(scale)
     return frequency, growth, known, margin
 
 
@@ -114,8 +113,8 @@ def _apart(values: Complex, radius: Array, rigid: Mask) -> Mask:
     return np.asarray((distance > reach).all(axis=2), dtype=np.bool_)
 
 
-def _gap_margin(values: Complex, rigid: Mask, mean: Array) -> Array:
-    """Return the smallest squared gap of neighbours over mean**2, or the smallest w over mean; (s,).
+def _gap_margin(values: Complex, rigid: Mask, scale: Array) -> Array:
+    """Return the smallest squared gap of neighbours over scale**2, or the smallest w over scale; (s,).
 
     The squared gap of a complex pair is negative. Unlike the growth rate, which is zero on the
     stable side and has a square root at the onset, the squared gap passes through an onset smoothly.
@@ -126,6 +125,6 @@ def _gap_margin(values: Complex, rigid: Mask, mean: Array) -> Array:
         gaps = np.diff(line, axis=1)
     squared = np.where(np.isfinite(gaps), np.square(gaps), np.inf).min(axis=1, initial=np.inf)
     pairs = -np.square(2 * values.imag).max(axis=1, where=~rigid, initial=0.0)
-    squared = np.where(pairs < 0, pairs, squared) / np.square(mean)
-    margin: Array = np.minimum(squared, line[:, 0] / mean)
+    squared = np.where(pairs < 0, pairs, squared) / np.square(scale)
+    margin: Array = np.minimum(squared, line[:, 0] / scale)
     return margin

@@ -111,7 +111,8 @@ def samples_by_block(inputs: Inputs, points: Callable[[slice], Array], rows: sli
     parts = []
     for start in range(rows.start // BLOCK * BLOCK, rows.stop, BLOCK):
         stop = min(start + BLOCK, total)
-        part = inputs.samples(points(slice(start, stop)))
+        # The numbers keep the dim where a stratum leaves no other input.
+        part = inputs.samples(points(slice(start, stop))).assign_coords(sample=np.arange(start, stop))
         parts.append(part.isel(sample=slice(max(rows.start - start, 0), rows.stop - start)))
     whole = parts[0] if len(parts) == 1 else xr.concat(parts, "sample", data_vars="all", join="exact")
     numbers = np.arange(rows.start, rows.stop)

@@ -39,7 +39,7 @@ def wilson(hits: Array, n: Array, confidence: float) -> tuple[Array, Array]:
     low, high : array
     """
     z = ndtri(0.5 + confidence / 2)
-    draws = np.maximum(n, 1e-300)
+    draws = np.maximum(n, 1.0)
     share = np.where(n > 0, hits / draws, 0.5)
     centre = (share + z**2 / (2 * draws)) / (1 + z**2 / draws)
     half = z * np.sqrt(share * (1 - share) / draws + z**2 / (4 * draws**2)) / (1 + z**2 / draws)

@@ -27,7 +27,7 @@ def show_results(tree: xr.DataTree, console: Console | None = None) -> None:
     screen.print(f"[bold]{escape(str(tree.attrs.get('title', 'hipuq results')))}[/bold]")
     names = json.loads(tree.attrs.get("report", "{}")).get("mode_names", {})
     for analysis in analyses(tree):
-        for i, (of, results) in enumerate(estimates(tree, analysis)):
+        for i, (_, results) in enumerate(estimates(tree, analysis)):
             if i == 0:
                 line = f"{results.attrs['model']}, {results.attrs['method']}, seed {results.attrs['seed']}"
                 screen.print(f"\n[bold]{escape(analysis)}[/bold]: {escape(line)}")
