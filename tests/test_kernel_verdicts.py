@@ -228,3 +228,17 @@ def test_a_mass_matrix_that_is_not_positive_definite_is_an_error():
 def test_a_threshold_must_not_be_negative(threshold):
     with pytest.raises(InputError, match="growth_threshold"):
         solve(pencils(np.eye(2)), growth_threshold=threshold)
+
+
+def test_a_symmetric_stiffness_is_stable_however_close_its_roots():
+    """Without friction nothing couples two equal oscillators: their crossing is no onset."""
+    rng = np.random.default_rng(0)
+    turned = np.linalg.qr(rng.normal(size=(6, 6)))[0]
+    double = turned @ np.diag([1.0, 1.0, 2.0, 2.0, 2.0, 3.0]) @ turned.T
+    for stiffness in (np.eye(4), (double + double.T) / 2):
+        spectra = solve(pencils(stiffness))
+        assert spectra.unstable.tolist() == [[0.0] * len(stiffness)]
+        assert not spectra.growth_rate.any()
+        assert spectra.margin[0] >= 0
+    singular = np.diag([0.0, 1.0, 1.0])
+    assert np.isnan(solve(pencils(singular)).any_unstable[0])

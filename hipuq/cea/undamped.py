@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.bounds import FILTER, ZERO, Complex, conditioned_eigenvalues, norms, scales
+from hipuq.cea.bounds import EPS, FILTER, SAFETY, ZERO, Complex, conditioned_eigenvalues, norms, scales
 from hipuq.cea.pencils import Array
 
 Mask = NDArray[np.bool_]
@@ -68,17 +68,31 @@ def _judged_roots(
     values: Complex = np.linalg.eigvals(stiffness).astype(np.complex128)
     norm = norms(stiffness)[:, None]
     radius = np.broadcast_to(FILTER * norm, values.shape)
-    rigid, known = _judge(values, radius, ZERO * norm, mechanisms, threshold)
+    nowhere = np.zeros((len(values), 1), bool)
+    rigid, known = _judge(values, radius, ZERO * norm, mechanisms, threshold, nowhere)
     flagged = np.flatnonzero(~known.all(axis=1))
     if flagged.size:
-        values[flagged], radius = conditioned_eigenvalues(stiffness[flagged])
+        part = stiffness[flagged]
+        values[flagged], radius = conditioned_eigenvalues(part)
+        # Eigenvalues of a symmetric matrix are real, however close: nothing couples them.
+        symmetric = (part == part.transpose(0, 2, 1)).all(axis=(1, 2))
+        if symmetric.any():
+            values[flagged[symmetric]] = np.linalg.eigvalsh(part[symmetric])
+            radius[symmetric] = SAFETY * EPS * norm[flagged[symmetric]]
         zero = np.maximum(ZERO * norm[flagged], radius)
-        rigid[flagged], known[flagged] = _judge(values[flagged], radius, zero, mechanisms[flagged], threshold)
+        rigid[flagged], known[flagged] = _judge(
+            values[flagged], radius, zero, mechanisms[flagged], threshold, symmetric[:, None]
+        )
     return values, rigid, known
 
 
 def _judge(
-    values: Complex, radius: Array, zero: Array, mechanisms: NDArray[np.intp], threshold: float
+    values: Complex,
+    radius: Array,
+    zero: Array,
+    mechanisms: NDArray[np.intp],
+    threshold: float,
+    symmetric: Mask,
 ) -> tuple[Mask, Mask]:
     """Say which roots are mechanisms, and of which the verdict is known when each is off by `radius`.
 
@@ -91,7 +105,7 @@ def _judge(
     if threshold == 0:
         real = values.imag == 0
         flutter = np.abs(values.imag) > radius
-        known: Mask = flutter | (real & (modulus > radius) & _apart(values, radius, rigid))
+        known: Mask = flutter | (real & (modulus > radius) & (symmetric | _apart(values, radius, rigid)))
     else:
         root = np.sqrt(modulus)
         error = np.divide(radius, 2 * root, out=np.full_like(root, np.inf), where=root > 0)
