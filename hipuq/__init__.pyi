@@ -8,13 +8,13 @@ from .driver import run as run
 from .errors import HipuqError as HipuqError
 from .evaluation import evaluate as evaluate
 from .inputs import Inputs as Inputs
-from .inputs import relative as relative
-from .inputs import shift as shift
 from .store import load_outcomes as load_outcomes
 from .store import load_results as load_results
 from .store import save_outcomes as save_outcomes
 from .store import save_results as save_results
 from .study import load_study as load_study
 from .study import run_study as run_study
+from .variation import relative as relative
+from .variation import shift as shift
 
 __version__: str

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from hipuq.contact import ContactPatterns
 from hipuq.distributions import FAMILIES, from_family
 from hipuq.errors import HipuqError, StudyError, unknown_name
-from hipuq.inputs import relative, shift
+from hipuq.variation import relative, shift
 
 CONTACT_PATTERNS = "contact_patterns"
 MAXIMUM_BYTES = 1_000_000

@@ -24,6 +24,7 @@ ORDER = [
     ["schema"],
     ["distributions"],
     ["contact"],
+    ["variation"],
     ["inputs"],
     ["sampling"],
     ["cea"],
@@ -119,4 +120,4 @@ def test_registries_agree_with_their_folders():
     shared = {"base", "intervals", "reduction", "results", "__init__"}
     assert {path.stem for path in (PACKAGE / "methods").glob("*.py")} - shared == set(METHODS)
     modules = {function.__module__.split(".")[-1] for function in MODELS.values()}
-    assert {path.stem for path in (PACKAGE / "models").glob("*.py")} - {"base", "__init__"} == modules
+    assert {path.stem for path in (PACKAGE / "models").glob("*.py")} - {"base", "parameter", "__init__"} == modules

@@ -7,9 +7,10 @@ samples. The ones here are built from matrices, see :class:`hipuq.models.base.CE
 from collections.abc import Callable
 
 from hipuq.models import mode_coupling, oscillator_ring
-from hipuq.models.base import CEAModel, Parameter
+from hipuq.models.base import CEAModel
 from hipuq.models.mode_coupling import two_dof
 from hipuq.models.oscillator_ring import ring
+from hipuq.models.parameter import Parameter
 
 MODELS: dict[str, Callable[..., CEAModel]] = {
     "ring": ring,

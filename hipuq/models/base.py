@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,48 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from hipuq import schema
 from hipuq.cea import Pencils, Spectra, mode_shapes, solve
 from hipuq.errors import InputError, SchemaError, unknown_name
-from hipuq.inputs import Inputs, Nominal
+from hipuq.inputs import Inputs
+from hipuq.models.parameter import Parameter
+from hipuq.variation import Nominal
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A parameter of a model: its nominal value and the values that it may take.
-
-    Attributes
-    ----------
-    nominal : (size,) array or float
-        Nominal value; a number for a parameter without an element dim.
-    minimum : float
-        Smallest value allowed.
-    open : bool
-        Whether the minimum itself is excluded.
-    integer : bool
-        Whether only 0 and 1 are allowed.
-    """
-
-    nominal: Array
-    minimum: float = -np.inf
-    open: bool = False
-    boolean: bool = False
-
-    def check(self, name: str, values: Array) -> None:
-        """Raise an InputError if any of the values, sample first, is not allowed."""
-        units = schema.PARAMETERS[name].units
-        unit = "" if units == "1" else f" {units}"
-        if self.boolean:
-            bad, rule = ~np.isin(values, (0, 1)), "must be true or false"
-        else:
-            below = values <= self.minimum if self.open else values < self.minimum
-            bad = below | ~np.isfinite(values)
-            rule = "must be a finite number"
-            if np.isfinite(self.minimum):
-                rule += f" {'above' if self.open else 'not below'} {self.minimum:g}{unit}"
-        if bad.any():
-            where = tuple(np.argwhere(bad)[0])
-            place = f"sample {where[0]}" + "".join(f", element {i + 1}" for i in where[1:])
-            raise InputError(f"{name} is {values[where]:g}{unit} in {place}: it {rule}")
 
 
 class CEAModel(ABC):

@@ -23,7 +23,8 @@ from scipy.special import cosdg, sindg
 from hipuq import schema
 from hipuq.cea import Pencils
 from hipuq.errors import InputError, unknown_name
-from hipuq.models.base import CEAModel, Parameter
+from hipuq.models.base import CEAModel
+from hipuq.models.parameter import Parameter
 
 Array = NDArray[np.float64]
 
