@@ -35,7 +35,7 @@ def near_onset(preset: str, seed: int, size: int):
 def test_known_verdicts_near_an_onset_are_exact(preset):
     pencils = near_onset(preset, 7, 125)
     matrices, _ = pencils.reduced()
-    spectra = solve(pencils)
+    spectra = solve(pencils, certify="never")
     verdict, count = spectra.any_unstable, spectra.unstable_count
     flutter = np.array([oracle.exact_counts(matrix) for matrix in matrices])
     exact = flutter.sum(axis=1) > 0
@@ -49,6 +49,12 @@ def test_known_verdicts_near_an_onset_are_exact(preset):
     assert 0.1 < exact.mean() < 0.9
     plain = np.array([oracle.lapack_unstable(matrix) for matrix in matrices])
     assert (plain != exact).any()
+    # With the structured solver and the certificate nothing stays open, and nothing is wrong.
+    for certify in ("auto", "always"):
+        proved = solve(pencils, certify=certify)
+        assert np.array_equal(proved.any_unstable, exact)
+        assert np.array_equal(proved.unstable_count, flutter[:, 0] // 2 + flutter[:, 1])
+        assert np.array_equal(proved.margin < 0, exact)
 
 
 def test_false_flutter_of_plain_eigenvalues_is_not_believed():

@@ -120,4 +120,8 @@ def test_registries_agree_with_their_folders():
     shared = {"base", "intervals", "reduction", "results", "__init__"}
     assert {path.stem for path in (PACKAGE / "methods").glob("*.py")} - shared == set(METHODS)
     modules = {function.__module__.split(".")[-1] for function in MODELS.values()}
-    assert {path.stem for path in (PACKAGE / "models").glob("*.py")} - {"base", "parameter", "__init__"} == modules
+    assert {path.stem for path in (PACKAGE / "models").glob("*.py")} - {
+        "base",
+        "parameter",
+        "__init__",
+    } == modules

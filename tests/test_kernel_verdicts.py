@@ -8,7 +8,7 @@ from helpers import assert_same_bits, joined, pencils, random_pencils
 
 import hipuq
 from hipuq.cea import damping_ratio, solve
-from hipuq.cea.bounds import conditioned_eigenvalues
+from hipuq.cea.bounds import CERTIFICATE, conditioned_eigenvalues
 from hipuq.errors import InputError
 
 FREE = np.array([[1.0, -1.0], [-1.0, 1.0]])
@@ -35,16 +35,26 @@ def test_a_wrongly_declared_mechanism_leaves_all_unknown(damping):
 @pytest.mark.parametrize("damping", [None, 0.1 * FREE])
 def test_an_undeclared_zero_is_unknown(damping):
     """A zero eigenvalue could be divergence after rounding: the kernel must be told."""
-    spectra = solve(pencils(FREE, damping=damping))
+    spectra = solve(pencils(FREE, damping=damping), certify="never")
     assert np.isnan(spectra.unstable[0, 0])
     assert np.isnan(spectra.any_unstable[0])
     assert np.isnan(spectra.unstable_count[0])
 
 
+def test_the_certificate_finds_an_undeclared_mechanism():
+    """A real root whose bound contains 0 is a mechanism, not divergence."""
+    spectra = solve(pencils(FREE))
+    assert spectra.any_unstable.tolist() == [0]
+    assert spectra.mechanisms.tolist() == [1]
+    assert spectra.frequency[0, 0] == 0
+    assert spectra.decided_by.tolist() == [CERTIFICATE]
+
+
 def test_too_few_declared_mechanisms_are_unknown():
     chain = np.zeros((3, 3))
     chain[:2, :2] = FREE
-    assert np.isnan(solve(pencils(chain, mechanisms=1)).any_unstable[0])
+    assert np.isnan(solve(pencils(chain, mechanisms=1), certify="never").any_unstable[0])
+    assert solve(pencils(chain, mechanisms=1)).mechanisms.tolist() == [2]
     assert solve(pencils(chain, mechanisms=2)).any_unstable.tolist() == [0]
 
 
@@ -61,9 +71,20 @@ def test_mechanisms_differ_within_a_batch():
 def test_an_exact_jordan_block_is_unknown(size):
     """On the onset itself the double root is defective: any rounding decides it either way."""
     block = np.eye(size) + np.eye(size, k=1)
-    spectra = solve(pencils(block))
+    spectra = solve(pencils(block), certify="never")
     assert np.isnan(spectra.unstable).all()
     assert np.isnan(spectra.any_unstable[0]) and np.isnan(spectra.margin[0])
+    assert spectra.decided_by.tolist() == [-1]
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_the_certificate_knows_an_exact_multiple_root(size):
+    """A real root of any multiplicity is no growing exponential."""
+    spectra = solve(pencils(np.eye(size) + np.eye(size, k=1)))
+    assert spectra.unstable.tolist() == [[0.0] * size]
+    assert spectra.frequency[0] == pytest.approx(np.full(size, 1 / (2 * np.pi)))
+    assert spectra.margin.tolist() == [0.0]
+    assert spectra.decided_by.tolist() == [CERTIFICATE]
 
 
 def test_a_double_root_without_coupling_is_not_called_unstable():
@@ -75,10 +96,12 @@ def test_an_unknown_mode_beside_a_known_unstable_one():
     stiffness = np.zeros((4, 4))
     stiffness[:2, :2] = [[10.0, 1.0], [0.0, 10.0]]
     stiffness[2:, 2:] = FLUTTER
-    spectra = solve(pencils(stiffness))
+    spectra = solve(pencils(stiffness), certify="never")
     assert spectra.any_unstable.tolist() == [1]
     assert np.isnan(spectra.unstable_count[0])
     assert spectra.margin[0] < 0
+    certified = solve(pencils(stiffness))
+    assert certified.unstable_count.tolist() == [1]
 
 
 def test_inside_a_pair_the_decaying_mode_comes_first():
@@ -241,4 +264,4 @@ def test_a_symmetric_stiffness_is_stable_however_close_its_roots():
         assert not spectra.growth_rate.any()
         assert spectra.margin[0] >= 0
     singular = np.diag([0.0, 1.0, 1.0])
-    assert np.isnan(solve(pencils(singular)).any_unstable[0])
+    assert np.isnan(solve(pencils(singular), certify="never").any_unstable[0])

@@ -4,8 +4,19 @@ The eigenvalue problem is ``(l**2 M + l C + K0 + mu K1) y = 0`` (Oberst et al., 
 eq. 1). Frequency is ``Im l / (2 pi)``, growth rate ``Re l``, damping ratio ``-Re l / abs(l)``.
 """
 
+from hipuq.cea.bounds import ALWAYS, AUTO, NEVER
 from hipuq.cea.modes import ModeShapes, mode_shapes
 from hipuq.cea.pencils import Pencils
 from hipuq.cea.spectrum import Spectra, damping_ratio, solve
 
-__all__ = ["ModeShapes", "Pencils", "Spectra", "damping_ratio", "mode_shapes", "solve"]
+__all__ = [
+    "ALWAYS",
+    "AUTO",
+    "NEVER",
+    "ModeShapes",
+    "Pencils",
+    "Spectra",
+    "damping_ratio",
+    "mode_shapes",
+    "solve",
+]

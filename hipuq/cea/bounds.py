@@ -9,6 +9,12 @@ from hipuq.cea.pencils import Array
 
 Complex = NDArray[np.complex128]
 
+DOUBLE, STRUCTURED, CERTIFICATE = range(3)
+"""Paths that give a verdict: double precision, the structured solver, exact arithmetic."""
+
+AUTO, ALWAYS, NEVER = "auto", "always", "never"
+"""When to go beyond double precision: where it leaves a verdict open, for all samples, or not at all."""
+
 EPS = float(np.finfo(np.float64).eps)
 
 FILTER = 3e-5

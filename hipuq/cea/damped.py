@@ -5,7 +5,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.bounds import EPS, FILTER, Complex, conditioned_eigenvalues, norms, scales
+from hipuq.cea.bounds import (
+    ALWAYS,
+    AUTO,
+    CERTIFICATE,
+    DOUBLE,
+    EPS,
+    FILTER,
+    NEVER,
+    Complex,
+    conditioned_eigenvalues,
+    norms,
+    scales,
+)
+from hipuq.cea.certificate import certify_damped
 from hipuq.cea.pencils import Array
 
 Mask = NDArray[np.bool_]
@@ -15,8 +28,8 @@ TIE = 1e-9
 
 
 def damped_modes(
-    stiffness: Array, damping: Array, mechanisms: NDArray[np.intp], threshold: float
-) -> tuple[Array, Array, Mask, Array]:
+    stiffness: Array, damping: Array, mechanisms: NDArray[np.intp], threshold: float, certify: str = AUTO
+) -> tuple[Array, Array, Mask, Array, NDArray[np.int8]]:
     """Return the modes of a batch by ascending frequency.
 
     A state space of n degrees of freedom has 2n eigenvalues: each complex pair is one mode, and so
@@ -34,6 +47,8 @@ def damped_modes(
         are computed, because its double eigenvalue 0 is defective in the state space.
     threshold : float
         Growth rate above which a mode is unstable [1/s].
+    certify : str
+        ``"auto"``, ``"always"`` or ``"never"``.
 
     Returns
     -------
@@ -43,24 +58,32 @@ def damped_modes(
         Whether the side of the threshold on which a mode lies is beyond rounding.
     margin : (s,) array
         (threshold - largest growth rate) / root mean w [1].
+    decided_by : (s,) array of int8
+        The path that gave the verdicts.
     """
     s, n = stiffness.shape[:2]
     frequency = np.zeros((s, n))
     growth = np.zeros((s, n))
     known = np.ones((s, n), bool)
+    decided_by = np.full(s, DOUBLE, np.int8)
     largest = np.empty(s)
     for m in np.unique(mechanisms):
         rows = np.flatnonzero(mechanisms == m)
         part, drag, taken = _without_mechanisms(stiffness[rows], damping[rows], int(m))
-        frequency[rows, m:], growth[rows, m:], certain = _state_space_modes(part, drag, threshold)
+        frequency[rows, m:], growth[rows, m:], certain, decided_by[rows] = _state_space_modes(
+            part, drag, threshold, certify
+        )
         known[rows, m:] = certain & taken[:, None]
         known[rows, :m] = taken[:, None]
         largest[rows] = growth[rows, m:].max(axis=1)
-    return frequency, growth, known, (threshold - largest) / np.sqrt(scales(stiffness, mechanisms))
+    margin = (threshold - largest) / np.sqrt(scales(stiffness, mechanisms))
+    return frequency, growth, known, margin, decided_by
 
 
-def _state_space_modes(stiffness: Array, damping: Array, threshold: float) -> tuple[Array, Array, Mask]:
-    """Return frequency, growth rate and whether the verdict is known, of n modes; (s, n)."""
+def _state_space_modes(
+    stiffness: Array, damping: Array, threshold: float, certify: str
+) -> tuple[Array, Array, Mask, NDArray[np.int8]]:
+    """Return frequency, growth rate and whether the verdict is known, of n modes, and the path."""
     s, n = stiffness.shape[:2]
     # Frobenius norms of A are sums of squared frequencies; the root puts l / rate near 1.
     rate = np.sqrt(np.maximum(norms(stiffness), np.finfo(np.float64).tiny))
@@ -76,6 +99,11 @@ def _state_space_modes(stiffness: Array, damping: Array, threshold: float) -> tu
     if flagged.size:
         values[flagged], radius = conditioned_eigenvalues(states[flagged])
         known[flagged] = np.abs(values[flagged].real - limit[flagged]) > radius
+    decided_by = np.full(s, DOUBLE, np.int8)
+    open_ = np.arange(s) if certify == ALWAYS else np.flatnonzero(~known.all(axis=1))
+    for row in open_ if certify != NEVER else ():
+        known[row] = certify_damped(stiffness[row], damping[row], threshold, values[row] * rate[row])
+        decided_by[row] = CERTIFICATE
     # Upper complex ones first, then real ones from the largest down: the first n are the modes.
     kind = np.sign(values.imag)
     order = np.lexsort((-values.real, -kind), axis=1)[:, :n]
@@ -88,7 +116,7 @@ def _state_space_modes(stiffness: Array, damping: Array, threshold: float) -> tu
     rows, first = np.nonzero(close & (ordered.imag[:, :-1] > 0) & (np.diff(ordered.real, axis=1) < 0))
     order[rows, first], order[rows, first + 1] = order[rows, first + 1], order[rows, first]
     values, known = np.take_along_axis(values, order, 1), np.take_along_axis(known, order, 1)
-    return values.imag / (2 * np.pi), values.real, known
+    return values.imag / (2 * np.pi), values.real, known, decided_by
 
 
 def _without_mechanisms(stiffness: Array, damping: Array, m: int) -> tuple[Array, Array, Mask]:

@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hipuq.cea.bounds import ALWAYS, AUTO, NEVER
 from hipuq.cea.damped import damped_modes
 from hipuq.cea.pencils import Array, Pencils
 from hipuq.cea.undamped import undamped_modes
-from hipuq.errors import InputError
+from hipuq.errors import InputError, unknown_name
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,9 @@ class Spectra:
         mean of w), and the smallest real w over that mean. Otherwise it is
         (threshold - largest growth rate) / root mean w.
     mechanisms : (s,) array of int
-        Number of rigid mechanisms taken out, as the model declares it.
+        Number of rigid mechanisms: those that the model declares, or more if more were found.
+    decided_by : (s,) array of int8
+        `DOUBLE`, `STRUCTURED` or `CERTIFICATE` of `hipuq.cea.bounds`; -1 where nothing decided.
     """
 
     frequency: Array
@@ -50,6 +53,7 @@ class Spectra:
     unstable: NDArray[np.float32]
     margin: Array
     mechanisms: NDArray[np.intp]
+    decided_by: NDArray[np.int8]
 
     @property
     def any_unstable(self) -> NDArray[np.float32]:
@@ -66,7 +70,7 @@ class Spectra:
         return count
 
 
-def solve(pencils: Pencils, *, growth_threshold: float = 0.0) -> Spectra:
+def solve(pencils: Pencils, *, growth_threshold: float = 0.0, certify: str = AUTO) -> Spectra:
     """Solve a batch of eigenvalue problems and judge their stability.
 
     Each sample is solved by itself, so results do not depend on the batch that it is in.
@@ -77,6 +81,10 @@ def solve(pencils: Pencils, *, growth_threshold: float = 0.0) -> Spectra:
         The matrices of s samples.
     growth_threshold : float, default 0
         Growth rate above which a mode counts as unstable [1/s], not negative.
+    certify : str
+        ``"auto"``: what double precision leaves open goes to the structured solver and then to the
+        certificate. ``"always"``: the certificate judges every sample. ``"never"``: what is open
+        stays unknown.
 
     Returns
     -------
@@ -85,30 +93,37 @@ def solve(pencils: Pencils, *, growth_threshold: float = 0.0) -> Spectra:
     Raises
     ------
     InputError
-        If the threshold is negative or not finite, or a mass matrix is not positive definite.
+        If the threshold is negative or not finite, there is no such way to certify, or a mass
+        matrix is not positive definite.
     """
     if not (np.isfinite(growth_threshold) and growth_threshold >= 0):
         raise InputError(
             f"growth_threshold is {growth_threshold}: it must be a finite number of 1/s, 0 or above"
         )
+    if certify not in (AUTO, ALWAYS, NEVER):
+        raise unknown_name("way to certify", certify, (AUTO, ALWAYS, NEVER))
     stiffness, damping = pencils.reduced()
     mechanisms = pencils.mechanisms
     s, n = stiffness.shape[:2]
     frequency, growth, known = np.empty((s, n)), np.empty((s, n)), np.empty((s, n), bool)
-    margin = np.empty(s)
+    margin, decided_by = np.empty(s), np.empty(s, np.int8)
     damped = np.zeros(s, bool) if damping is None else damping.any(axis=(1, 2))
     free = ~damped
     if free.any():
-        frequency[free], growth[free], known[free], margin[free] = undamped_modes(
-            stiffness[free], mechanisms[free], growth_threshold
+        frequency[free], growth[free], known[free], margin[free], decided_by[free] = undamped_modes(
+            stiffness[free], mechanisms[free], growth_threshold, certify
         )
     if damping is not None and damped.any():
-        frequency[damped], growth[damped], known[damped], margin[damped] = damped_modes(
-            stiffness[damped], damping[damped], mechanisms[damped], growth_threshold
+        frequency[damped], growth[damped], known[damped], margin[damped], decided_by[damped] = damped_modes(
+            stiffness[damped], damping[damped], mechanisms[damped], growth_threshold, certify
         )
     unstable = np.where(known, growth > growth_threshold, np.nan).astype(np.float32)
-    spectra = Spectra(frequency, growth, unstable, margin, mechanisms)
-    margin[np.isnan(spectra.any_unstable)] = np.nan
+    # The certificate may find more zero roots than were declared: they are mechanisms too.
+    found = (known & (frequency == 0) & (growth == 0)).sum(axis=1)
+    spectra = Spectra(frequency, growth, unstable, margin, np.maximum(mechanisms, found), decided_by)
+    undecided = np.isnan(spectra.any_unstable)
+    margin[undecided] = np.nan
+    decided_by[undecided] = -1
     return spectra
 
 

@@ -7,18 +7,37 @@ question is whether eigenvalues are real, so a verdict is known when no eigenval
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.bounds import EPS, FILTER, SAFETY, ZERO, Complex, conditioned_eigenvalues, norms, scales
+from hipuq.cea.bounds import (
+    ALWAYS,
+    AUTO,
+    CERTIFICATE,
+    DOUBLE,
+    EPS,
+    FILTER,
+    NEVER,
+    SAFETY,
+    STRUCTURED,
+    ZERO,
+    Complex,
+    conditioned_eigenvalues,
+    norms,
+    scales,
+)
+from hipuq.cea.certificate import certify_damped, certify_undamped
 from hipuq.cea.pencils import Array
+from hipuq.cea.structured import block_size, conjugate_pairs, structured_eigenvalues
 
 Mask = NDArray[np.bool_]
 
 
 def undamped_modes(
-    stiffness: Array, mechanisms: NDArray[np.intp], threshold: float
-) -> tuple[Array, Array, Mask, Array]:
+    stiffness: Array, mechanisms: NDArray[np.intp], threshold: float, certify: str = AUTO
+) -> tuple[Array, Array, Mask, Array, NDArray[np.int8]]:
     """Return the modes of a batch by ascending frequency.
 
     Parameters
@@ -29,6 +48,8 @@ def undamped_modes(
         Number of zero eigenvalues by construction.
     threshold : float
         Growth rate above which a mode is unstable [1/s].
+    certify : str
+        ``"auto"``, ``"always"`` or ``"never"``.
 
     Returns
     -------
@@ -40,8 +61,11 @@ def undamped_modes(
         Whether the side of the threshold on which a mode lies is beyond rounding.
     margin : (s,) array
         Stability margin [1], meaningful where the verdict is known.
+    decided_by : (s,) array of int8
+        The path that gave the verdicts.
     """
-    values, rigid, known = _judged_roots(stiffness, mechanisms, threshold)
+    roots = _judged_roots(stiffness, mechanisms, threshold, certify)
+    values, rigid, known = roots.values, roots.rigid, roots.known
     root = np.sqrt(values)
     real = values.imag == 0
     frequency = np.where(rigid, 0.0, root.real / (2 * np.pi))
@@ -58,32 +82,91 @@ def undamped_modes(
         margin = _gap_margin(values, rigid, scale)
     else:
         margin = (threshold - growth.max(axis=1)) / np.sqrt(scale)
-    return frequency, growth, known, margin
+    return frequency, growth, known, margin, roots.decided_by
 
 
-def _judged_roots(
-    stiffness: Array, mechanisms: NDArray[np.intp], threshold: float
-) -> tuple[Complex, Mask, Mask]:
-    """Return the roots w, which of them are mechanisms, and of which the verdict is known; (s, n)."""
+@dataclass
+class _Roots:
+    """Roots w of a batch while they are judged: (s, n) but for `decided_by`, (s,)."""
+
+    values: Complex
+    rigid: Mask
+    known: Mask
+    decided_by: NDArray[np.int8]
+
+    def open(self) -> NDArray[np.intp]:
+        """Return the samples in which a verdict is unknown."""
+        return np.flatnonzero(~self.known.all(axis=1))
+
+    def take(self, rows: NDArray[np.intp], values: Complex, judged: tuple[Mask, Mask], path: int) -> None:
+        """Put in what a path says of some samples, where it says more than was known before."""
+        rigid, known = judged
+        better = known.all(axis=1) | (known.sum(axis=1) > self.known[rows].sum(axis=1))
+        rows = rows[better]
+        self.values[rows], self.rigid[rows], self.known[rows] = values[better], rigid[better], known[better]
+        self.decided_by[rows] = path
+
+
+def _judged_roots(stiffness: Array, mechanisms: NDArray[np.intp], threshold: float, certify: str) -> _Roots:
+    """Return the roots w, which of them are mechanisms, of which the verdict is known, and by which path."""
     values: Complex = np.linalg.eigvals(stiffness).astype(np.complex128)
     norm = norms(stiffness)[:, None]
-    radius = np.broadcast_to(FILTER * norm, values.shape)
-    nowhere = np.zeros((len(values), 1), bool)
-    rigid, known = _judge(values, radius, ZERO * norm, mechanisms, threshold, nowhere)
-    flagged = np.flatnonzero(~known.all(axis=1))
-    if flagged.size:
-        part = stiffness[flagged]
-        values[flagged], radius = conditioned_eigenvalues(part)
+    uniform = np.broadcast_to(FILTER * norm, values.shape)
+    rigid, known = _judge(values, uniform, ZERO * norm, mechanisms, threshold)
+    roots = _Roots(values, rigid, known, np.full(len(values), DOUBLE, np.int8))
+    if certify == ALWAYS:
+        _certify(roots, np.arange(len(values)), stiffness, mechanisms, threshold)
+        return roots
+    rows = roots.open()
+    if rows.size:
+        part = stiffness[rows]
+        values, radius = conditioned_eigenvalues(part)
         # Eigenvalues of a symmetric matrix are real, however close: nothing couples them.
         symmetric = (part == part.transpose(0, 2, 1)).all(axis=(1, 2))
         if symmetric.any():
-            values[flagged[symmetric]] = np.linalg.eigvalsh(part[symmetric])
-            radius[symmetric] = SAFETY * EPS * norm[flagged[symmetric]]
-        zero = np.maximum(ZERO * norm[flagged], radius)
-        rigid[flagged], known[flagged] = _judge(
-            values[flagged], radius, zero, mechanisms[flagged], threshold, symmetric[:, None]
-        )
-    return values, rigid, known
+            values[symmetric] = np.linalg.eigvalsh(part[symmetric])
+            radius[symmetric] = SAFETY * EPS * norm[rows[symmetric]]
+        zero = np.maximum(ZERO * norm[rows], radius)
+        judged = _judge(values, radius, zero, mechanisms[rows], threshold, symmetric[:, None])
+        # From here on these eigenvalues stand, known or not: they go with their bounds.
+        roots.known[rows] = False
+        roots.take(rows, values, judged, DOUBLE)
+    rows = roots.open()
+    if rows.size and certify != NEVER:
+        part = stiffness[rows]
+        size = block_size(part)
+        if size is not None:
+            values, radius = structured_eigenvalues(part, roots.values[rows], size)
+            values, paired = conjugate_pairs(values)
+            radius[~paired] = np.inf
+            zero = np.maximum(ZERO * norm[rows], radius)
+            judged = _judge(values, radius, zero, mechanisms[rows], threshold)
+            roots.take(rows, values, judged, STRUCTURED)
+        _certify(roots, roots.open(), stiffness, mechanisms, threshold)
+    return roots
+
+
+def _certify(
+    roots: _Roots, rows: NDArray[np.intp], stiffness: Array, mechanisms: NDArray[np.intp], threshold: float
+) -> None:
+    """Let the certificate judge some samples, one by one."""
+    for row in rows:
+        m = int(mechanisms[row])
+        proof = certify_undamped(stiffness[row], roots.values[row], m)
+        if not proof.known.all():
+            roots.known[row] = False
+            continue
+        values, paired = conjugate_pairs(proof.values[None])
+        rigid = np.argsort(np.argsort(np.abs(values), axis=1, kind="stable"), axis=1) < m
+        known = np.broadcast_to(paired[:, None], values.shape)
+        if threshold > 0 and known.all():
+            root = np.sqrt(-values[0])
+            sides = certify_damped(
+                stiffness[row], np.zeros_like(stiffness[row]), threshold, np.append(root, -root)
+            )
+            known = np.broadcast_to(sides.all(), values.shape)
+        roots.values[row], roots.rigid[row], roots.known[row] = values[0], rigid[0], known[0]
+        roots.decided_by[row] = CERTIFICATE
 
 
 def _judge(
@@ -92,7 +175,7 @@ def _judge(
     zero: Array,
     mechanisms: NDArray[np.intp],
     threshold: float,
-    symmetric: Mask,
+    symmetric: Mask | bool = False,
 ) -> tuple[Mask, Mask]:
     """Say which roots are mechanisms, and of which the verdict is known when each is off by `radius`.
 

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from hipuq import schema
-from hipuq.cea import Pencils, Spectra, mode_shapes, solve
+from hipuq.cea import ALWAYS, AUTO, NEVER, Pencils, Spectra, mode_shapes, solve
 from hipuq.errors import InputError, SchemaError, unknown_name
 from hipuq.inputs import Inputs
 from hipuq.models.parameter import Parameter
@@ -31,6 +31,8 @@ class CEAModel(ABC):
         The published set of nominal values.
     growth_threshold : float
         Growth rate above which a mode counts as unstable [1/s].
+    certify : str
+        When verdicts go beyond double precision: ``"auto"``, ``"always"``, ``"never"``.
     parameters : mapping
         Name -> `Parameter`, all known to the schema.
     outcomes : tuple of str
@@ -41,13 +43,20 @@ class CEAModel(ABC):
     outcomes: ClassVar[tuple[str, ...]] = (*schema.OUTCOMES, "status", "decided_by")
 
     def __init__(
-        self, preset: str, parameters: Mapping[str, Parameter], growth_threshold: float = 0.0
+        self,
+        preset: str,
+        parameters: Mapping[str, Parameter],
+        growth_threshold: float = 0.0,
+        certify: str = AUTO,
     ) -> None:
         if not (np.isfinite(growth_threshold) and growth_threshold >= 0):
             raise InputError(
                 f"growth_threshold is {growth_threshold}: it must be a finite number of 1/s, 0 or above"
             )
+        if certify not in (AUTO, ALWAYS, NEVER):
+            raise unknown_name("way to certify", certify, (AUTO, ALWAYS, NEVER))
         self.preset = preset
+        self.certify = certify
         self.parameters = dict(parameters)
         self.growth_threshold = float(growth_threshold)
         for name, parameter in self.parameters.items():
@@ -85,6 +94,7 @@ class CEAModel(ABC):
             "model": self.name,
             "preset": self.preset,
             "growth_threshold": self.growth_threshold,
+            "certify": self.certify,
             "nominal": changed,
         }
 
@@ -213,7 +223,7 @@ class CEAModel(ABC):
         Dataset
             Over ``sample`` and ``mode``.
         """
-        spectra = solve(self.pencils(samples), growth_threshold=self.growth_threshold)
+        spectra = solve(self.pencils(samples), growth_threshold=self.growth_threshold, certify=self.certify)
         return self._outcomes(spectra, self.outcomes if keep is None else tuple(keep))
 
     def _outcomes(self, spectra: Spectra, keep: tuple[str, ...]) -> xr.Dataset:
@@ -228,11 +238,10 @@ class CEAModel(ABC):
             elif name not in ("status", "decided_by"):
                 raise unknown_name("outcome", name, self.outcomes)
         status = np.where(undecided, schema.STATUS["undecided"], schema.STATUS["ok"]).astype(np.int8)
-        decided = np.where(undecided, -1, schema.DECIDED_BY["double"]).astype(np.int8)
         data["status"] = ("sample", status, schema.flag_attrs("status of the sample", schema.STATUS))
         data["decided_by"] = (
             "sample",
-            decided,
+            spectra.decided_by,
             schema.flag_attrs("what decided the verdict", schema.DECIDED_BY),
         )
         coords = {}

@@ -129,7 +129,13 @@ def _unit_mass(stiffness: Array, friction_stiffness: Array, mu: Array, damping: 
     )
 
 
-def two_dof(preset: str = "hoffmann2002", *, growth_threshold: float = 0.0, **nominal: float) -> CEAModel:
+def two_dof(
+    preset: str = "hoffmann2002",
+    *,
+    growth_threshold: float = 0.0,
+    certify: str = "auto",
+    **nominal: float,
+) -> CEAModel:
     """Return a mode-coupling model with two degrees of freedom.
 
     Parameters
@@ -138,6 +144,9 @@ def two_dof(preset: str = "hoffmann2002", *, growth_threshold: float = 0.0, **no
         ``"hoffmann2002"`` or ``"hulten"``.
     growth_threshold : float, default 0
         Growth rate above which a mode counts as unstable [1/s].
+    certify : str, default "auto"
+        ``"auto"``: verdicts that double precision leaves open are decided by the structured solver
+        or by exact arithmetic. ``"always"``: all by exact arithmetic. ``"never"``: they stay unknown.
     **nominal
         Other nominal values of the preset's parameters.
 
@@ -171,4 +180,4 @@ def two_dof(preset: str = "hoffmann2002", *, growth_threshold: float = 0.0, **no
     for name, value in values.items():
         minimum = 0.0 if name in _POSITIVE + _NOT_NEGATIVE else -np.inf
         parameters[name] = Parameter(np.array(value), minimum, open=name in _POSITIVE)
-    return {"hoffmann2002": Hoffmann, "hulten": Hulten}[preset](preset, parameters, growth_threshold)
+    return {"hoffmann2002": Hoffmann, "hulten": Hulten}[preset](preset, parameters, growth_threshold, certify)

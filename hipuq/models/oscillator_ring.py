@@ -184,6 +184,7 @@ def ring(
     *,
     oscillators: int = 9,
     growth_threshold: float = 0.0,
+    certify: str = "auto",
     **nominal: ArrayLike,
 ) -> OscillatorRing:
     """Return a ring of oscillators.
@@ -197,6 +198,9 @@ def ring(
         Number N, at least 2. Angles are then spread with the step 180 / (N - 1) deg.
     growth_threshold : float, default 0
         Growth rate above which a mode counts as unstable [1/s].
+    certify : str, default "auto"
+        ``"auto"``: verdicts that double precision leaves open are decided by the structured solver
+        or by exact arithmetic. ``"always"``: all by exact arithmetic. ``"never"``: they stay unknown.
     **nominal
         Other nominal values: ``friction``, ``contact``, ``mass``, ``spring_stiffness``,
         ``contact_stiffness``, ``spring_angle``, ``contact_angle``, ``friction_angle``,
@@ -250,7 +254,7 @@ def ring(
             raise unknown_name("parameter of the ring", name, base)
     for name, (value, size, rule) in base.items():
         parameters[name] = Parameter(_nominal(name, nominal.get(name, value), size), **rule)
-    model = OscillatorRing(preset, parameters, growth_threshold)
+    model = OscillatorRing(preset, parameters, growth_threshold, certify)
     model.friction_follows = follows
     return model
 

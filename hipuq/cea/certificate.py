@@ -1,0 +1,231 @@
+"""Verdicts that are proved: exact integer arithmetic on the matrix as it is given in doubles.
+
+Every double is an integer times a power of two, so the characteristic polynomial of a matrix of
+doubles is exact in integers. Approximate eigenvalues, however they were found, then get rigorous
+discs: with p monic of degree n, all its roots lie in the discs about the z_i of radius
+``n |p(z_i)| / prod |z_i - z_j|``, and a group of k discs that touches no other holds exactly k of
+them (B. T. Smith, J. ACM 17 (1970) 661). Where those discs do not settle it, the roots are isolated
+from the polynomial itself, multiple ones included.
+
+What is proved is the verdict on the matrix A = M^(-1/2) K M^(-1/2) as rounded to doubles, mechanisms
+apart; in damped problems that on the pencil of A and D. Of a model's declared mechanisms it is proved
+that exactly so many roots lie within the rounding of the entries about zero. It is not proved that
+those entries are the right physics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hipuq.cea.bounds import ZERO, Complex
+from hipuq.cea.pencils import Array
+
+Mask = NDArray[np.bool_]
+
+# Discs are computed in doubles from exact values of p; this covers the rounding of that many times.
+_OUTWARDS = 1.0 + 1e-9
+
+
+@dataclass(frozen=True)
+class Certified:
+    """Roots of one matrix with what is proved of them.
+
+    Attributes
+    ----------
+    values : (n,) complex array
+        Centres of the enclosures; exactly real for roots proved real.
+    known : (n,) array of bool
+        Whether the verdict on the root is proved.
+    """
+
+    values: Complex
+    known: Mask
+
+
+def certify_undamped(stiffness: Array, start: Complex, mechanisms: int) -> Certified:
+    """Prove which eigenvalues w of a matrix are real, and the signs of the real ones.
+
+    Parameters
+    ----------
+    stiffness : (n, n) array
+        A [1/s^2].
+    start : (n,) complex array
+        Approximations; good ones make it quick, bad ones do no harm.
+    mechanisms : int
+        Number of zero eigenvalues by construction.
+
+    Returns
+    -------
+    Certified
+        Roots inside the bound of the entries' rounding about zero are exactly 0: the declared
+        mechanisms, and any more of them. If there are fewer than declared nothing is known.
+    """
+    polynomial, exponent = _characteristic_polynomial(stiffness)
+    unit = 2.0**exponent
+    zero = ZERO * float(np.linalg.norm(stiffness))
+    centres, radius = _discs(polynomial, _distinct(start, mechanisms, zero) / unit)
+    values = _proved(centres * unit, radius * unit, zero, mechanisms)
+    if values is None:
+        centres, radius, multiplicity = _isolated(polynomial)
+        values = _proved(centres * unit, radius * unit, zero, mechanisms, multiplicity)
+    if values is None:
+        return Certified(np.asarray(start, np.complex128), np.zeros(len(start), bool))
+    return Certified(values, np.ones(len(start), bool))
+
+
+def _proved(
+    centres: Complex,
+    radius: Array,
+    zero: float,
+    mechanisms: int,
+    multiplicity: NDArray[np.intp] | None = None,
+) -> Complex | None:
+    """Return the roots, real and zero ones exactly so, if the discs prove what each is.
+
+    Parameters
+    ----------
+    centres, radius : (k,) array
+        Discs: each holds one root if it touches no other, or `multiplicity` equal ones.
+    zero : float
+        Bound of the entries' rounding.
+    mechanisms : int
+    multiplicity : (k,) array of int, optional
+        1 by default.
+    """
+    count = np.ones(len(centres), np.intp) if multiplicity is None else multiplicity
+    inside = np.abs(centres) + radius <= zero
+    gaps = np.abs(centres[:, None] - centres[None, :])
+    touching = gaps <= radius[:, None] + radius[None, :]
+    np.fill_diagonal(touching, False)
+    # Inside the bound about zero it does not matter which disc holds which root.
+    touching &= ~(inside[:, None] & inside[None, :])
+    real = centres.imag == 0
+    clear = inside | np.where(real, np.abs(centres) - radius > zero, np.abs(centres.imag) > radius)
+    if touching.any() or not clear.all() or count[inside].sum() < mechanisms:
+        return None
+    return np.repeat(np.where(inside, 0.0, centres), count)
+
+
+def certify_damped(stiffness: Array, damping: Array, threshold: float, values: Complex) -> Mask:
+    """Prove on which side of the threshold eigenvalues l lie.
+
+    The companion matrix of ``(l + g)**2 + (l + g) D + A`` has the roots l - g: those right of the
+    imaginary axis grow faster than g.
+
+    Parameters
+    ----------
+    stiffness : (n, n) array
+        A [1/s^2], mechanisms taken out.
+    damping : (n, n) array
+        D [1/s].
+    threshold : float
+        g [1/s].
+    values : (2n,) complex array
+        Approximations of all eigenvalues l.
+
+    Returns
+    -------
+    (2n,) array of bool
+        Whether the side of each is proved to be the one that its approximation is on.
+    """
+    n = len(stiffness)
+    scale = 2.0 ** np.round(np.log2(max(np.sqrt(np.linalg.norm(stiffness)), 1e-300)))
+    companion = np.zeros((2 * n, 2 * n))
+    companion[:n, n:] = np.eye(n)
+    companion[n:, :n] = -stiffness / scale**2
+    companion[n:, n:] = -damping / scale
+    polynomial, exponent = _characteristic_polynomial(companion, shift=-threshold / scale)
+    unit = 2.0**exponent
+    start = _distinct(values / scale - threshold / scale, 0, 0.0)
+    centres, radius = _discs(polynomial, start / unit)
+    clear = np.abs(centres.real) > radius
+    if clear.all():
+        same: Mask = np.sign(centres.real) == np.sign(values.real - threshold)
+        return same
+    isolated, around, multiplicity = _isolated(polynomial)
+    right = int(multiplicity[isolated.real > around].sum())
+    left = int(multiplicity[isolated.real < -around].sum())
+    # Sides are counts; they belong to the approximations if those have the same counts.
+    claimed = int((values.real > threshold).sum())
+    proved = right == claimed and left == 2 * n - claimed
+    return np.full(2 * n, proved)
+
+
+def _characteristic_polynomial(matrix: Array, shift: float = 0.0) -> tuple[Any, int]:
+    """Return the exact characteristic polynomial of (matrix + shift) / 2**exponent, and the exponent."""
+    from flint import fmpz_mat
+
+    n = len(matrix)
+    mantissa, exponent = np.frexp(np.append(matrix.ravel(), shift))
+    whole = (mantissa * 2.0**53).astype(np.int64)
+    power = exponent.astype(int) - 53
+    used = whole != 0
+    # Finer than the entries, so that centres of discs can be given as integers too.
+    lowest = min(int(power[used].min()), int(exponent[used].max()) - 80) if used.any() else 0
+    entries = [int(a) << int(b - lowest) if a else 0 for a, b in zip(whole, power, strict=True)]
+    for i in range(n):
+        entries[i * (n + 1)] += entries[-1]
+    return fmpz_mat(n, n, entries[:-1]).charpoly(), lowest
+
+
+def _distinct(values: Complex, mechanisms: int, zero: float) -> Complex:
+    """Return approximations that all differ: mechanisms spread about zero, equal ones moved apart."""
+    spread = values.copy()
+    small = np.argsort(np.abs(spread), kind="stable")[:mechanisms]
+    # Radii of their discs are about n times this.
+    apart = zero / (2 * len(values) + 2)
+    spread[small] = apart * np.exp(2j * np.pi * np.arange(mechanisms) / max(mechanisms, 1))
+    scale = np.abs(spread).max(initial=1e-300)
+    order = np.lexsort((spread.imag, spread.real))
+    for a, b in pairwise(order):
+        if spread[a] == spread[b]:
+            spread[b] += 1e-12 * scale
+    return spread
+
+
+def _discs(polynomial: Any, values: Complex) -> tuple[Complex, Array]:
+    """Return centres, rounded to integers, and Smith's radii; infinite where centres coincide."""
+    n = len(values)
+    bits = max(0, int(np.ceil(np.log2(np.abs(values).max(initial=1.0)))))
+    real = [int(x) for x in values.real]
+    imag = [int(x) for x in values.imag]
+    coefficients = list(reversed(polynomial.coeffs()))
+    size = np.empty(n)
+    for i, (x, y) in enumerate(zip(real, imag, strict=True)):
+        size[i] = _modulus(coefficients, x, y, bits * n)
+    scale = 2.0**bits
+    centres = np.array(real, np.float64) / scale + 1j * (np.array(imag, np.float64) / scale)
+    gaps = np.abs(centres[:, None] - centres[None, :])
+    np.fill_diagonal(gaps, 1.0)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        radius = n * size / gaps.prod(axis=1)
+    radius = np.where(np.isfinite(radius), radius, np.inf) * _OUTWARDS
+    return np.asarray(centres * scale, np.complex128), radius * scale
+
+
+def _modulus(coefficients: list[Any], x: int, y: int, bits: int) -> float:
+    """Return |p(x + iy)| / 2**bits from exact integers, coefficients from the highest down."""
+    a, b = coefficients[0] * 0, coefficients[0] * 0
+    for c in coefficients:
+        a, b = a * x - b * y + c, a * y + b * x
+    return float(np.hypot(_scaled(int(a), bits), _scaled(int(b), bits)))
+
+
+def _scaled(number: int, bits: int) -> float:
+    """Return number / 2**bits, rounded."""
+    drop = max(0, number.bit_length() - 64)
+    return float(np.ldexp(float(number >> drop), drop - bits))
+
+
+def _isolated(polynomial: Any) -> tuple[Complex, Array, NDArray[np.intp]]:
+    """Return enclosures of the distinct roots and their multiplicities; real ones are exactly real."""
+    roots = polynomial.complex_roots()
+    centres = np.array([complex(float(z.real.mid()), float(z.imag.mid())) for z, _ in roots])
+    inner = np.array([float(z.real.rad()) + float(z.imag.rad()) for z, _ in roots])
+    radius = (inner + 2.0**-51 * np.abs(centres)) * _OUTWARDS
+    return centres, radius, np.array([count for _, count in roots], np.intp)
