@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -56,7 +56,10 @@ def run(
     if dry_run:
         return
     folder = out if out is not None else Path("results") / plan.name
-    tree = run_study(plan, folder, n_jobs=jobs, say=typer.echo)
+    try:
+        tree = run_study(plan, folder, n_jobs=jobs, say=typer.echo)
+    except KeyboardInterrupt:
+        _fail(f"interrupted: analyses that were complete are in {folder}", 130)
     from hipuq.report.page import write_report
 
     page = write_report(tree, folder)
@@ -113,14 +116,12 @@ def main() -> None:
         if _DEBUG:
             raise
         _fail(str(error))
-    except KeyboardInterrupt:
-        _fail("interrupted", 130)
     except Exception as error:
         if _DEBUG:
             raise
         _fail(f"unexpected {type(error).__name__}: {error}; hipuq --debug shows where")
 
 
-def _fail(message: str, code: int = 1) -> None:
+def _fail(message: str, code: int = 1) -> NoReturn:
     print(f"hipuq: {' '.join(message.split())}", file=sys.stderr)
     raise SystemExit(code)

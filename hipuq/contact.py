@@ -58,7 +58,11 @@ class ContactPatterns:
         oscillators: int = 9,
         weights: Sequence[float] | None = None,
     ) -> None:
-        counts = [in_contact] if isinstance(in_contact, (int, np.integer)) else list(in_contact)
+        if isinstance(in_contact, (int, np.integer)):
+            in_contact = [int(in_contact)]
+        if not isinstance(in_contact, Iterable) or isinstance(in_contact, str):
+            raise InputError(f"in_contact is {in_contact!r}: it must be an integer or a list of them")
+        counts = list(in_contact)
         if not _is_count(oscillators) or not 1 <= oscillators <= 60:
             raise InputError(f"oscillators is {oscillators!r}: it must be an integer from 1 to 60")
         for count in counts:
@@ -74,7 +78,10 @@ class ContactPatterns:
     def _checked(self, weights: Sequence[float] | None, order: NDArray[np.intp]) -> tuple[float, ...] | None:
         if weights is None:
             return None
-        values = np.asarray(weights, dtype=np.float64)
+        try:
+            values = np.asarray(weights, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"weights are {weights!r}: they must be numbers") from None
         allowed = {len(order), self.size}
         if values.ndim != 1 or len(values) not in allowed:
             raise InputError(
@@ -257,10 +264,11 @@ class ContactPatterns:
             ``contact(sample, oscillator)`` with coords ``in_contact`` and ``pattern`` over sample.
         """
         levels = self.levels(name).drop_vars("weight").drop_attrs(deep=False)
-        return levels.rename(pattern="sample").assign_coords(
+        samples = levels.rename(pattern="sample").assign_coords(
             sample=("sample", np.arange(self.size), schema.COORDINATES["sample"].attrs),
             pattern=("sample", levels["pattern"].values, schema.COORDINATES["pattern"].attrs),
         )
+        return schema.stamp(samples, f"every contact pattern, {self.size} samples")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the description that `from_dict` takes."""

@@ -162,6 +162,8 @@ def _from_ppf(value: Any) -> Distribution:
         keywords = {key: _plain(arg) for key, arg in value.kwds.items()}
         if None not in plain and None not in keywords.values():
             description = {"kind": "scipy", "name": family, "args": plain, "kwargs": keywords}
+            if not _rebuilds(description, value):
+                description = {"kind": "opaque", "text": repr(value)}
     cdf = getattr(value, "cdf", None)
     ends = np.asarray(value.ppf(np.array([0.0, 1.0])), dtype=np.float64)
     return Distribution(
@@ -171,6 +173,15 @@ def _from_ppf(value: Any) -> Distribution:
         (float(ends[0]), float(ends[1])),
         description,
     )
+
+
+def _rebuilds(description: Mapping[str, Any], value: Any) -> bool:
+    """Say whether a description of scipy's gives the distribution that it was made from."""
+    try:
+        again = _scipy_frozen(description)
+        return bool(np.array_equal(again.ppf(_PROBES), value.ppf(_PROBES)))
+    except (InputError, TypeError, ValueError):
+        return False
 
 
 def _plain(value: Any) -> float | None:
@@ -246,13 +257,13 @@ def from_family(family: str, parameters: Mapping[str, Any]) -> Distribution:
         raise unknown_name("distribution", family, FAMILIES)
     name, required, optional = FAMILIES[family]
     allowed = required + optional
-    for key in required:
-        if key not in parameters:
-            raise InputError(f"the distribution {family!r} needs {', '.join(required)}: {key} is missing")
     for key, value in parameters.items():
         if key not in allowed:
             raise unknown_name(f"parameter of the distribution {family!r}", key, allowed)
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
             raise InputError(f"{key} of the distribution {family!r} is {value!r}: it must be a finite number")
+    for key in required:
+        if key not in parameters:
+            raise InputError(f"the distribution {family!r} needs {', '.join(required)}: {key} is missing")
     made = _chaospy.from_dict({"name": name, "kwargs": dict(parameters)})
     return as_distribution(made, f"distribution {family!r}")

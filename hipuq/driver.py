@@ -8,7 +8,7 @@ from typing import Any
 
 import xarray as xr
 
-from hipuq.errors import InputError, unknown_name
+from hipuq.errors import InputError, check_name, unknown_name
 from hipuq.evaluation import evaluate
 from hipuq.inputs import Inputs
 from hipuq.methods import METHODS, Method
@@ -23,9 +23,7 @@ def method_named(name: str) -> Method:
     UnknownNameError
         If there is none.
     """
-    if name not in METHODS:
-        raise unknown_name("method", name, METHODS)
-    return METHODS[name]
+    return METHODS[check_name("method", name, METHODS)]
 
 
 def design(

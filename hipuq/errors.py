@@ -32,6 +32,33 @@ class StoreError(HipuqError, OSError):
     """A file or folder that cannot be read or written."""
 
 
+def check_name(kind: str, name: object, allowed: Iterable[str]) -> str:
+    """Return a name that is one of the `allowed` ones.
+
+    Parameters
+    ----------
+    kind : str
+        What the name stands for, such as ``"parameter"``.
+    name : object
+        The name that was given.
+    allowed : iterable of str
+        The names that exist.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    UnknownNameError
+        If it is none of them.
+    """
+    names = list(allowed)
+    if not isinstance(name, str) or name not in names:
+        raise unknown_name(kind, name, names)
+    return name
+
+
 def unknown_name(kind: str, name: object, allowed: Iterable[str]) -> UnknownNameError:
     """Return the error for a name that is none of the `allowed` ones.
 

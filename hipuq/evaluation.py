@@ -90,9 +90,10 @@ def evaluate(
     outputs = _joined([part for part in parts if part is not None])
     outcomes = samples.assign(outputs.data_vars).assign_coords(outputs.coords)
     if "status" not in outcomes:
-        outcomes["status"] = _status(outcomes)
-    label = getattr(model, "label", getattr(model, "__qualname__", type(model).__qualname__))
-    options = {"model": getattr(model, "options", {"model": label})}
+        outcomes["status"] = _status(outcomes, list(outputs.data_vars))
+    label = str(getattr(model, "label", getattr(model, "__qualname__", type(model).__qualname__)))
+    # Only a model with a label says in its options what rebuilds it.
+    options = {"model": model.options if hasattr(model, "label") and hasattr(model, "options") else label}
     outcomes = schema.stamp(
         outcomes, f"evaluate {label} on {size} samples", model=label, options=options, like=samples.attrs
     )
@@ -101,8 +102,8 @@ def evaluate(
 
 def _checked_names(model: Model, keep: Iterable[str]) -> tuple[str, ...]:
     """Return the outcomes to keep, known ones if the model says which it has."""
-    if isinstance(keep, str):
-        raise InputError(f"keep is {keep!r}: it must be a list of outcome names, [{keep!r}]")
+    if isinstance(keep, str) or not isinstance(keep, Iterable):
+        raise InputError(f"keep is {keep!r}: it must be a list of outcome names, ['margin']")
     names = tuple(dict.fromkeys(keep))
     if not names:
         raise InputError("keep is empty: name at least one outcome, or leave it out for all")
@@ -137,6 +138,9 @@ def _block(model: Model, samples: xr.Dataset, keep: tuple[str, ...] | None, star
                 f"output {str(name)!r} of the model has the dims {dict(values.sizes)}: "
                 f"it needs 'sample' of length {size}"
             )
+        if values.dtype.kind not in "biufc":
+            raise SchemaError(f"output {str(name)!r} of the model must hold numbers, it holds {values.dtype}")
+    given = _in_order(given, samples)
     if keep is not None:
         missing = [name for name in keep if name not in given]
         if missing:
@@ -144,6 +148,23 @@ def _block(model: Model, samples: xr.Dataset, keep: tuple[str, ...] | None, star
         always = [name for name in ("status", "decided_by") if name in given and name not in keep]
         given = given[[*keep, *always]]
     return given.drop_vars([name for name in given.coords if "sample" in given[name].dims])
+
+
+def _in_order(given: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
+    """Return outputs in the order of the samples, without attributes that are those of a sample variable.
+
+    A model may sort its samples, if it keeps their labels. Arithmetic hands on name and unit of the
+    first operand, which are not those of the result.
+    """
+    if "sample" in given.coords and "sample" in samples.coords:
+        here, there = given["sample"].values, samples["sample"].values
+        if not np.array_equal(here, there):
+            if not np.array_equal(np.sort(here), np.sort(there)):
+                raise SchemaError("the model returned other labels of 'sample' than it was given")
+            given = given.isel(sample=np.argsort(here)[np.argsort(np.argsort(there))])
+    inherited = [values.attrs for values in samples.variables.values() if values.attrs]
+    bare = {n: v.drop_attrs() for n, v in given.data_vars.items() if v.attrs and v.attrs in inherited}
+    return given.assign(bare)
 
 
 def _joined(parts: list[xr.Dataset]) -> xr.Dataset:
@@ -158,11 +179,13 @@ def _joined(parts: list[xr.Dataset]) -> xr.Dataset:
     return xr.Dataset(data, coords=first.coords)
 
 
-def _status(outcomes: xr.Dataset) -> xr.DataArray:
-    """Return the status of outcomes of a model that gives none."""
+def _status(outcomes: xr.Dataset, outputs: list[Any]) -> xr.DataArray:
+    """Return the status of outcomes of a model that gives none: undecided where an output is missing."""
     status = np.full(outcomes.sizes["sample"], schema.STATUS["ok"], np.int8)
-    if "any_unstable" in outcomes:
-        status[np.isnan(outcomes["any_unstable"].values.astype(float))] = schema.STATUS["undecided"]
+    for name in outputs:
+        values = outcomes[name]
+        missing = values.isnull().any([dim for dim in values.dims if dim != "sample"]).values
+        status[missing] = schema.STATUS["undecided"]
     attrs = schema.flag_attrs("status of the sample", schema.STATUS)
     return xr.DataArray(status, dims="sample", attrs=attrs)
 

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from hipuq import schema
 from hipuq.contact import ContactPatterns
 from hipuq.errors import InputError, unknown_name
 from hipuq.variation import Input, Nominal, as_input
@@ -62,6 +63,20 @@ class Inputs(Mapping[str, Input]):
     def _check(self) -> None:
         if not self._entries:
             raise InputError("there are no inputs: give at least one parameter a distribution")
+        lengths: dict[str, tuple[str, int]] = {}
+        for name, entry in self._entries.items():
+            if name in schema.COORDINATES:
+                raise InputError(
+                    f"an input cannot be called {name!r}: designs keep their books under that name"
+                )
+            for dim, length in zip(entry.dims, entry.nominal.shape, strict=True):
+                other, known = lengths.setdefault(dim, (name, length))
+                if dim == "sample" or known != length:
+                    raise InputError(
+                        f"dim {dim!r} of {name} has length {length}, that of {other} has {known}"
+                    )
+        if len(self.discrete) > 1:
+            raise InputError(f"there are several contact patterns, {self.discrete}: one is possible")
 
     def __getitem__(self, name: str) -> Input:
         if name not in self._entries:

@@ -66,7 +66,7 @@ def check_count(name: str, value: object, minimum: int = 1) -> int:
     raise InputError(f"{name} is {value!r}: it must be an integer of {minimum} or more")
 
 
-def check_size(sampler: str, n: int) -> None:
+def check_size(sampler: str, n: int, replicates: int = 1) -> None:
     """Check that a sampler can make a design of n points.
 
     Parameters
@@ -74,6 +74,9 @@ def check_size(sampler: str, n: int) -> None:
     sampler : str
         One of `SAMPLERS`.
     n : int
+        Points of one replicate.
+    replicates : int
+        How many of them there are, for the message.
 
     Raises
     ------
@@ -92,7 +95,8 @@ def check_size(sampler: str, n: int) -> None:
     if sampler == "sobol" and n & (n - 1):
         below = 1 << (n.bit_length() - 1)
         raise InputError(
-            f"a Sobol design of {n} points is not balanced: take a power of 2, {below} or {2 * below}"
+            f"a Sobol design of {n * replicates} points in {replicates} replicates is not balanced: each "
+            f"needs a power of 2, so take {below * replicates} or {2 * below * replicates}"
         )
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from hipuq.errors import SchemaError, unknown_name
+from hipuq.errors import SchemaError, check_name, unknown_name
 
 VERDICT = "verdict"
 """Role of a variable of 1 (yes), 0 (no) and NaN (unknown)."""
@@ -209,6 +209,11 @@ def check_samples(samples: xr.Dataset, allowed: Iterable[str] | None = None) -> 
             raise SchemaError(f"samples variable {name!r} needs the dim 'sample', it has {values.dims}")
         if values.dtype.kind not in "biuf":
             raise SchemaError(f"samples variable {name!r} must hold numbers, it holds {values.dtype}")
+        if values.dtype.kind == "f" and not np.isfinite(values.values).all():
+            where = int(np.argwhere(~np.isfinite(values.transpose("sample", ...).values))[0][0])
+            value = values.transpose("sample", ...).values[where]
+            shown = value if np.ndim(value) == 0 else value[~np.isfinite(value)][0]
+            raise SchemaError(f"{name} is {shown} in sample {where}: it must be a finite number")
     return samples.sizes["sample"]
 
 
@@ -224,8 +229,7 @@ def check_outcomes(outcomes: xr.Dataset, of: str) -> xr.DataArray:
     """
     if not isinstance(outcomes, xr.Dataset):
         raise SchemaError(f"outcomes must be an xarray Dataset, not {type(outcomes).__name__}")
-    if of not in outcomes.data_vars:
-        raise unknown_name("outcome", of, [str(name) for name in outcomes.data_vars])
+    check_name("outcome", of, [str(name) for name in outcomes.data_vars])
     values = outcomes[of]
     if "sample" not in values.dims:
         raise SchemaError(f"outcome {of!r} needs the dim 'sample', it has {values.dims}")

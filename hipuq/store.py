@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -64,8 +65,10 @@ def load_results(path: str | os.PathLike[str]) -> xr.DataTree:
         raise StoreError(
             f"there are no results at {file}: give an output folder of hipuq run, or its {RESULTS_NAME}"
         )
-    with _reported("read", file), xr.open_datatree(file, engine="h5netcdf") as opened:
-        tree = opened.load().copy()
+    with _reported("read", file), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of files that are not netCDF, refused below
+        with xr.open_datatree(file, engine="h5netcdf") as opened:
+            tree = opened.load().copy()
     if not any("hipuq_version" in node.attrs for node in tree.subtree):
         raise StoreError(f"{file} is not a results file of hipuq: it has no attribute hipuq_version")
     return tree

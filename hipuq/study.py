@@ -17,13 +17,14 @@ import xarray as xr
 
 from hipuq import __version__, schema
 from hipuq.driver import method_named
-from hipuq.errors import HipuqError, InputError, StoreError, StudyError, unknown_name
+from hipuq.errors import HipuqError, InputError, StoreError, StudyError, check_name
 from hipuq.evaluation import evaluate
 from hipuq.inputs import Inputs
 from hipuq.methods import Method
 from hipuq.models import MODELS, CEAModel
+from hipuq.models.oscillator_ring import OscillatorRing
 from hipuq.sampling import seed_of
-from hipuq.store import RESULTS_NAME, save_outcomes, save_results
+from hipuq.store import RESULTS_NAME, load_results, save_outcomes, save_results
 from hipuq.study_file import ReportTable, StudyFile, read_study_file
 
 
@@ -122,7 +123,7 @@ def load_study(path: str | os.PathLike[str], *, seed: int | None = None) -> Stud
     try:
         chosen = table.seed if seed is None else seed_of(seed)
     except InputError as error:
-        raise StudyError(f"seed: {error}") from error
+        raise StudyError(f"seed is {seed!r}: it must be an integer from 0 to 2**63 - 1") from error
     name = file.resolve().parent.name if file.name == "study.toml" else file.stem
     return Study(name, table.title, table.description, chosen, tuple(analyses), table.report, text)
 
@@ -205,13 +206,7 @@ def _at_nominal(analysis: Analysis, report: ReportTable, n_jobs: int | None) -> 
         groups[f"{analysis.name}/friction_sweep"] = sweep
     if report.mode_shapes:
         sample = model.nominal(friction=report.shape_friction)
-        shapes = schema.stamp(
-            model.mode_shapes(sample),
-            f"mode shapes at friction {report.shape_friction}",
-            model=model.label,
-            options={"model": model.options},
-        )
-        groups[f"{analysis.name}/mode_shapes"] = shapes
+        groups[f"{analysis.name}/mode_shapes"] = model.mode_shapes(sample)
     return groups
 
 
@@ -219,9 +214,13 @@ def _check_writable(folder: Path) -> None:
     """Raise a StoreError now rather than after the computation."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        if (folder / RESULTS_NAME).exists():
+            load_results(folder)  # raises for a file that is not ours to replace
         probe = folder / f".hipuq-{os.getpid()}"
         probe.touch()
         probe.unlink()
+    except StoreError:
+        raise
     except OSError as error:
         raise StoreError(
             f"cannot write to {folder}: {error.strerror}; choose another folder with --out"
@@ -238,21 +237,29 @@ def _analysis(table: StudyFile, name: str) -> Analysis:
     method: Method = method_named(entry.method)
     designing, estimating = method.split(entry.options)
     for of in entry.of:
-        if of not in model.outcomes:
-            raise unknown_name("outcome in of", of, model.outcomes)
+        check_name("outcome in of", of, model.outcomes)
     evaluations = method.evaluations(inputs, entry.n, **designing)
+    _check_report(table.report, model)
     return Analysis(
         name, model, inputs, entry.method, entry.n, tuple(entry.of), designing, estimating, evaluations
     )
+
+
+def _check_report(report: ReportTable, model: CEAModel) -> None:
+    """Raise an InputError if the report asks for what the model does not have."""
+    pairs = [mode for pair in report.pairs for mode in pair]
+    for mode in [*report.mode_shapes, *pairs, *map(int, report.mode_names)]:
+        if not 1 <= mode <= model.dofs:
+            raise InputError(f"report names mode {mode}: {model.label} has the modes 1 to {model.dofs}")
+    if report.mode_shapes and not isinstance(model, OscillatorRing):
+        raise InputError(f"report asks for mode_shapes: only a ring has a shape to draw, not {model.label}")
 
 
 def _model(options: Mapping[str, Any]) -> CEAModel:
     """Return the model that a [model] table describes."""
     rest = dict(options)
     name = rest.pop("name", None)
-    if name not in MODELS:
-        raise unknown_name("model", name, MODELS)
     try:
-        return MODELS[name](**rest)
+        return MODELS[check_name("model", name, MODELS)](**rest)
     except TypeError as error:
         raise InputError(f"model {name!r} does not take these options: {error}") from error

@@ -52,6 +52,8 @@ class InputTable(BaseModel):
         """
         rest = dict(self.model_extra or {})
         if self.distribution == CONTACT_PATTERNS:
+            if self.apply != "absolute" or self.each is not None:
+                raise StudyError(f"input {parameter!r}: contact patterns take neither apply nor each")
             for key in rest:
                 if key not in ("in_contact", "oscillators", "weights"):
                     raise unknown_name(
@@ -140,6 +142,13 @@ class ReportTable(Table):
     def _pair(cls, value: Any) -> Any:
         return tuple(value) if isinstance(value, list) else value
 
+    @field_validator("friction_sweep")
+    @classmethod
+    def _ascending(cls, value: tuple[float, float] | None) -> tuple[float, float] | None:
+        if value is not None and not value[0] < value[1]:
+            raise ValueError(f"the range {list(value)} must ascend")
+        return value
+
     @field_validator("pairs", mode="before")
     @classmethod
     def _pairs(cls, value: Any) -> Any:
@@ -149,7 +158,7 @@ class ReportTable(Table):
     @classmethod
     def _numbers(cls, value: dict[str, str]) -> dict[str, str]:
         for key in value:
-            if not key.isdigit():
+            if not (key.isascii() and key.isdecimal()):
                 raise ValueError(f"{key!r} is not the number of a mode")
         return value
 
@@ -229,7 +238,8 @@ _TABLES: dict[str, type[BaseModel]] = {"analysis": AnalysisTable, "report": Repo
 
 def _first_line(error: ValidationError, data: dict[str, Any]) -> str:
     """Return the first problem as one line, with the near match of an unknown key."""
-    first = error.errors()[0]
+    # A key that is not known explains one that is missing.
+    first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
     place = [str(part) for part in first["loc"]]
     if first["type"] == "extra_forbidden":
         table = _TABLES.get(place[0], StudyFile) if len(place) > 1 else StudyFile

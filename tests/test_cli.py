@@ -104,7 +104,7 @@ def test_lists(monkeypatch, capsys):
     [
         (["run", "nowhere"], "cannot read the study"),
         (["run", "STUDY", "--jobs", "0"], "--jobs is 0"),
-        (["run", "STUDY", "--seed", "-1"], "rng is -1"),
+        (["run", "STUDY", "--seed", "-1"], "seed is -1"),
         (["run", "STUDY", "--out", "/dev/null/x"], "choose another folder with --out"),
         (["show", "nowhere"], "there are no results"),
         (["show", "STUDY/study.toml"], "cannot read"),

@@ -190,3 +190,12 @@ def test_descriptions_that_mean_nothing_are_named():
     for description, error, message in cases:
         with pytest.raises(error, match=message):
             from_description(description)
+
+
+def test_a_scipy_distribution_that_only_shares_a_name_is_opaque():
+    """What is stored must give the same quantiles, or it must say that it cannot."""
+    values = stats.rv_discrete(name="norm", values=([1, 2], [0.5, 0.5]))()
+    made = as_distribution(values)
+    assert not made.rebuilds
+    with pytest.raises(InputError, match="cannot be rebuilt"):
+        from_description(made.description)

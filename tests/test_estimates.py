@@ -212,3 +212,16 @@ def test_intervals_of_strata_add_up_in_squares():
     half = float(results["probability_high"][0] - results["probability"][0])
     overall = float(results["probability_overall_high"] - results["probability_overall"])
     assert overall == pytest.approx(half / 2)
+
+
+def test_outcomes_of_other_strata_are_refused():
+    """Pattern 1 of 8 and 9 in contact is not pattern 1 of 6 to 9."""
+    model = hipuq.models.ring()
+    inputs, other = (
+        model.inputs(friction=cp.Uniform(0, 0.1), contact=hipuq.ContactPatterns(in_contact=counts))
+        for counts in ((8, 9), (6, 7, 8, 9))
+    )
+    samples = hipuq.design("monte_carlo", inputs, n=2, rng=0, stratify="contact")
+    outcomes = hipuq.evaluate(model, samples, keep=["any_unstable"])
+    with pytest.raises(SchemaError, match="another contact"):
+        hipuq.estimate("monte_carlo", outcomes, other, of="any_unstable")

@@ -7,6 +7,7 @@ import chaospy as cp
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 
 import hipuq
 import hipuq.evaluation
@@ -209,3 +210,47 @@ def test_wrong_options_are_named():
         hipuq.evaluate(model, samples, n_jobs=0)
     with pytest.raises(InputError, match=r"must be a concurrent\.futures\.Executor"):
         hipuq.evaluate(model, samples, executor="threads")
+
+
+def test_a_model_that_sorts_its_samples_is_put_in_order():
+    def sorting(samples: xr.Dataset) -> xr.Dataset:
+        return xr.Dataset({"y": 2 * samples.sortby("x")["x"]})
+
+    inputs = hipuq.Inputs(x=stats.uniform())
+    samples = hipuq.design("monte_carlo", inputs, n=50, rng=0)
+    outcomes = hipuq.evaluate(sorting, samples)
+    assert np.array_equal(outcomes["y"], 2 * outcomes["x"])
+    other = samples.assign_coords(sample=np.arange(50) + 7)
+
+    def relabelling(given: xr.Dataset) -> xr.Dataset:
+        return xr.Dataset({"y": given["x"].assign_coords(sample=given["sample"] + 1)})
+
+    with pytest.raises(SchemaError, match="other labels"):
+        hipuq.evaluate(
+            lambda given: xr.Dataset({"y": given["x"].assign_coords(sample=given["sample"] + 1)}), other
+        )
+
+
+def test_an_output_does_not_inherit_name_and_unit():
+    """Arithmetic of xarray hands on attributes; a share must not become a mean by that."""
+    model = hipuq.models.ring()
+    samples = model.nominal(friction=np.linspace(0, 1, 10))
+    outcomes = hipuq.evaluate(
+        lambda given: xr.Dataset({"y": (given["friction"] > 0.3).astype(float)}), samples
+    )
+    assert outcomes["y"].attrs == {}
+    inputs = model.inputs(friction=stats.uniform())
+    assert "probability" in hipuq.estimate("monte_carlo", outcomes, inputs, of="y")
+
+
+def test_a_missing_output_is_undecided():
+    def half(samples: xr.Dataset) -> xr.Dataset:
+        return xr.Dataset({"y": samples["x"].where(samples["x"] > 0.5)})
+
+    outcomes = hipuq.evaluate(half, hipuq.design("monte_carlo", hipuq.Inputs(x=stats.uniform()), n=20, rng=0))
+    assert np.array_equal(outcomes["status"] == schema.STATUS["undecided"], np.isnan(outcomes["y"]))
+
+
+def test_outputs_that_are_no_numbers_are_refused():
+    with pytest.raises(SchemaError, match="must hold numbers"):
+        hipuq.evaluate(lambda given: xr.Dataset({"y": ("sample", ["a"] * 10)}), square_samples())

@@ -200,3 +200,20 @@ def test_inputs_that_cannot_be_rebuilt_say_so():
     text = hipuq.Inputs(x=Own()).to_json()
     with pytest.raises(InputError, match="cannot be rebuilt"):
         Inputs.from_json(text)
+
+
+@pytest.mark.parametrize("name", ["sample", "weight", "pattern", "replicate", "in_contact", "oscillator"])
+def test_names_that_designs_use_are_refused(name):
+    with pytest.raises(InputError, match=f"cannot be called '{name}'"):
+        hipuq.Inputs(**{name: cp.Uniform(0, 1)})
+
+
+def test_inputs_that_do_not_go_together_are_refused():
+    patterns = hipuq.ContactPatterns(in_contact=(8, 9))
+    with pytest.raises(InputError, match="several contact patterns"):
+        hipuq.Inputs(a=patterns, b=patterns)
+    with pytest.raises(InputError, match="dim 'part'"):
+        hipuq.Inputs(
+            a=hipuq.relative(cp.Uniform(0, 1), each="part", nominal=[1.0, 2.0]),
+            b=hipuq.relative(cp.Uniform(0, 1), each="part", nominal=[1.0, 2.0, 3.0]),
+        )

@@ -92,7 +92,7 @@ def test_ziegler_flutter_begins_and_ends(distance):
     assert (spectra.frequency[3] == 0).all()
     # Both modes of the divergent pendulum grow, w = 7/2 - p -+ sqrt((7/2 - p)^2 - 2) over 2.
     half = (3.5 - end * (1 + distance)) / 2
-    squares = half + np.array([-1, 1]) * np.sqrt(half**2 - 0.5)
+    squares = half + np.array([1, -1]) * np.sqrt(half**2 - 0.5)
     assert spectra.growth_rate[3] == pytest.approx(np.sqrt(-squares), rel=1e-6)
 
 

@@ -265,3 +265,17 @@ def test_a_symmetric_stiffness_is_stable_however_close_its_roots():
         assert spectra.margin[0] >= 0
     singular = np.diag([0.0, 1.0, 1.0])
     assert np.isnan(solve(pencils(singular), certify="never").any_unstable[0])
+
+
+def test_strongly_nonnormal_matrices_get_condition_numbers():
+    """A radius that holds for rings holds for no other family: here errors are far larger."""
+    n = 7
+    side = np.ones(n) / np.sqrt(n)
+    mirror = np.eye(n) - 2 * np.outer(side, side)
+    triangle = np.diag(1 + 0.01 * np.arange(n) / n) + 0.3 * np.triu(np.ones((n, n)), 1)
+    stiffness = mirror @ triangle @ mirror
+    assert np.iscomplex(np.linalg.eigvals(stiffness)).any()
+    assert np.isnan(solve(pencils(stiffness), certify="never").any_unstable[0])
+    certified = solve(pencils(stiffness))
+    assert certified.any_unstable.tolist() == [0]
+    assert certified.decided_by.tolist() == [CERTIFICATE]

@@ -116,3 +116,15 @@ def test_labelled_shapes_agree_with_the_kernel():
     assert np.array_equal(labelled["friction_work"], plain.friction_work)
     radius = np.hypot(*labelled["position"].transpose("axis", "oscillator").values)
     assert radius == pytest.approx(1)
+
+
+def test_modes_have_the_numbers_that_the_kernel_gives():
+    """Damped pairs whose frequencies agree but for rounding, and divergent modes of frequency 0."""
+    ring = hipuq.models.ring(mass_damping=20.0)
+    for friction in np.linspace(0.05, 0.2, 20):
+        case = ring.pencils(ring.nominal(friction=friction))
+        assert mode_shapes(case).eigenvalue.real == pytest.approx(solve(case).growth_rate[0], abs=1e-3)
+    for drag in (None, 1e-9 * np.eye(3)):
+        case = pencils(np.diag([-1.0, -4.0, 9.0]), damping=drag)
+        assert solve(case).growth_rate[0] == pytest.approx([1, 2, 0], abs=1e-8)
+        assert mode_shapes(case).eigenvalue.real == pytest.approx([1, 2, 0], abs=1e-8)

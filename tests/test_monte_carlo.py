@@ -184,7 +184,7 @@ def test_infeasible_designs_are_errors():
         (InputError, "n is 1.5", 1.5, {}),
         (InputError, "n is True", True, {}),
         (InputError, "n is 30: it must be a multiple of the 8 replicates", 30, {"sampler": "sobol"}),
-        (InputError, "power of 2, 8 or 16", 12 * 8, {"sampler": "sobol"}),
+        (InputError, "take 64 or 128", 12 * 8, {"sampler": "sobol"}),
         (UnknownNameError, "did you mean 'sobol'", 8, {"sampler": "sobel"}),
         (UnknownNameError, "did you mean 'contact'", 8, {"stratify": "contacts"}),
         (UnknownNameError, "unknown discrete input to stratify 'friction'", 8, {"stratify": "friction"}),

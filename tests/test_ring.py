@@ -259,3 +259,36 @@ def test_bad_samples_are_named():
         model(good.rename(friction="frictoin"))
     with pytest.raises(UnknownNameError, match="did you mean 'friction'"):
         model.nominal(frictio=0.1)
+
+
+def test_elements_go_by_their_labels():
+    """Labels in another order are put in order; labels of another kind are refused."""
+    model = hipuq.models.ring()
+    sample = model.nominal(contact=[True, *[False] * 2, *[True] * 6], friction=0.01)
+    labelled = sample.assign_coords(oscillator=np.arange(1, 10))
+    turned = labelled.isel(oscillator=slice(None, None, -1))
+    assert np.array_equal(model(turned)["frequency"], model(sample)["frequency"])
+    with pytest.raises(SchemaError, match="labelled"):
+        model(sample.assign_coords(oscillator=np.arange(9)))
+    with pytest.raises(SchemaError, match="dims"):
+        model(model.nominal(mass=20.0).rename(oscillator="spring"))
+
+
+@pytest.mark.parametrize("changes", [{}, {"friction_angle": np.linspace(0, 90, 5)}])
+def test_options_rebuild_the_model(changes):
+    model = hipuq.models.ring("oberst2016-calibrated", oscillators=5, damping_ratio=0.01, **changes)
+    options = dict(model.options)
+    nominal = options.pop("nominal")
+    again = hipuq.models.MODELS[options.pop("model")](**options, **nominal)
+    sample = model.nominal(contact_angle=[170.0, 225.0, 270.0, 315.0, 0.0], friction=0.1)
+    assert np.array_equal(again(sample)["growth_rate"], model(sample)["growth_rate"])
+    assert again.options == model.options
+
+
+def test_nominal_takes_a_number_for_all_elements():
+    model = hipuq.models.ring()
+    sample = model.nominal(mass=20.0, friction=[0.0, 0.1])
+    assert sample["mass"].shape == (2, 9)
+    assert (sample["mass"] == 20).all()
+    with pytest.raises(InputError, match="mass has the shape"):
+        model.nominal(mass=[1.0, 2.0])

@@ -104,7 +104,21 @@ BROKEN = [
     ('preset = "oberst2016"', 'preset = "oberst2017"', "did you mean 'oberst2016'"),
     ("[inputs.friction]", "[inputs.frictoin]", "did you mean 'friction'"),
     ('distribution = "uniform"', 'distribution = "unifrom"', "did you mean 'uniform'"),
-    ("lower = 0.0", "lowr = 0.0", "lower is missing"),
+    ("lower = 0.0", "lowr = 0.0", "did you mean 'lower'"),
+    ("lower = 0.0", "", "lower is missing"),
+    ("in_contact = [8, 9]", "in_contact = 6.5", "must be an integer or a list"),
+    ("in_contact = [8, 9]", 'in_contact = [8, 9]\nweights = "abc"', "must be numbers"),
+    ("in_contact = [8, 9]", 'in_contact = [8, 9]\napply = "shift"', "neither apply nor each"),
+    ('name = "ring"', 'name = ["ring"]', "unknown model"),
+    ('preset = "oberst2016"\n[inputs', 'preset = "oberst2016"\nmass = "heavy"\n[inputs', "must be numbers"),
+    (
+        'preset = "oberst2016"\n[inputs',
+        'preset = "oberst2016"\ngrowth_threshold = "high"\n[inputs',
+        "finite number",
+    ),
+    ('options = { sampler = "sobol" }', "options = { confidence = 95 }", "between 0 and 1"),
+    ("n = 16", "N = 16", "unknown key"),
+    ("n = 64", "n = 1000", "take 512 or 1024"),
     ("upper = 0.1", "upper = 0.1\nuper = 3", "did you mean 'upper'"),
     ("upper = 0.1", "upper = nan", "finite"),
     ("upper = 0.1", "upper = inf", "finite"),
@@ -144,6 +158,30 @@ def test_a_broken_study_gives_one_line_that_helps(tmp_path, old, new, message):
     text = str(caught.value)
     assert message in text
     assert "\n" not in text.strip()
+
+
+REPORTS = [
+    ("mode_shapes = [99]", "mode 99"),
+    ("pairs = [[18, 19]]", "mode 19"),
+    ('mode_names = { "²" = "1" }', "not the number of a mode"),
+    ("friction_sweep = [0.1, 0.0]", "must ascend"),
+    ("friction_points = 1", "greater than or equal to 2"),
+]
+
+
+@pytest.mark.parametrize(("line", "message"), REPORTS)
+def test_a_report_that_cannot_be_made_is_refused_before_the_run(tmp_path, line, message):
+    with pytest.raises(StudyError, match=message):
+        hipuq.load_study(write(tmp_path, f"{SMALL}\n[report]\n{line}\n"))
+
+
+def test_a_file_of_somebody_else_is_not_replaced(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "results.nc").write_bytes(b"mine")
+    study = hipuq.load_study(write(tmp_path, SMALL))
+    with pytest.raises(StoreError, match="cannot read"):
+        hipuq.run_study(study, tmp_path / "out", progress=False)
+    assert (tmp_path / "out" / "results.nc").read_bytes() == b"mine"
 
 
 def test_a_missing_study_and_an_unwritable_folder(tmp_path):

@@ -26,8 +26,9 @@ import published
 
 import hipuq
 from hipuq.cea import Pencils, solve
-from hipuq.cea.bounds import FILTER, ZERO, norms
+from hipuq.cea.bounds import ZERO, norms
 from hipuq.cea.undamped import _judge
+from hipuq.models.oscillator_ring import FILTER
 
 PARTS = ("nominal", "scatter", "near onset")
 CHUNK = 250

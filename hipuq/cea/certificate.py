@@ -104,6 +104,9 @@ def _proved(
     np.fill_diagonal(touching, False)
     # Inside the bound about zero it does not matter which disc holds which root.
     touching &= ~(inside[:, None] & inside[None, :])
+    if multiplicity is not None:
+        # Isolated roots are apart by proof, though doubles may not tell.
+        touching[...] = False
     real = centres.imag == 0
     clear = inside | np.where(real, np.abs(centres) - radius > zero, np.abs(centres.imag) > radius)
     if touching.any() or not clear.all() or count[inside].sum() < mechanisms:

@@ -11,7 +11,6 @@ from hipuq.cea.bounds import (
     CERTIFICATE,
     DOUBLE,
     EPS,
-    FILTER,
     NEVER,
     Complex,
     conditioned_eigenvalues,
@@ -19,16 +18,19 @@ from hipuq.cea.bounds import (
     scales,
 )
 from hipuq.cea.certificate import certify_damped
+from hipuq.cea.numbering import TIE, mode_order
 from hipuq.cea.pencils import Array
 
 Mask = NDArray[np.bool_]
 
-TIE = 1e-9
-"""Frequencies this close, relative to the largest, are equal but for rounding."""
-
 
 def damped_modes(
-    stiffness: Array, damping: Array, mechanisms: NDArray[np.intp], threshold: float, certify: str = AUTO
+    stiffness: Array,
+    damping: Array,
+    mechanisms: NDArray[np.intp],
+    threshold: float,
+    certify: str = AUTO,
+    filter_radius: float = 0.0,
 ) -> tuple[Array, Array, Mask, Array, NDArray[np.int8]]:
     """Return the modes of a batch by ascending frequency.
 
@@ -49,6 +51,8 @@ def damped_modes(
         Growth rate above which a mode is unstable [1/s].
     certify : str
         ``"auto"``, ``"always"`` or ``"never"``.
+    filter_radius : float
+        As in `Pencils`.
 
     Returns
     -------
@@ -71,7 +75,7 @@ def damped_modes(
         rows = np.flatnonzero(mechanisms == m)
         part, drag, taken = _without_mechanisms(stiffness[rows], damping[rows], int(m))
         frequency[rows, m:], growth[rows, m:], certain, decided_by[rows] = _state_space_modes(
-            part, drag, threshold, certify
+            part, drag, threshold, certify, filter_radius
         )
         known[rows, m:] = certain & taken[:, None]
         known[rows, :m] = taken[:, None]
@@ -81,7 +85,7 @@ def damped_modes(
 
 
 def _state_space_modes(
-    stiffness: Array, damping: Array, threshold: float, certify: str
+    stiffness: Array, damping: Array, threshold: float, certify: str, filter_radius: float
 ) -> tuple[Array, Array, Mask, NDArray[np.int8]]:
     """Return frequency, growth rate and whether the verdict is known, of n modes, and the path."""
     s, n = stiffness.shape[:2]
@@ -92,7 +96,7 @@ def _state_space_modes(
     states[:, n:, :n] = -stiffness / np.square(rate)[:, None, None]
     states[:, n:, n:] = -damping / rate[:, None, None]
     values: Complex = np.linalg.eigvals(states).astype(np.complex128)
-    radius = np.broadcast_to(FILTER * norms(states)[:, None], values.shape)
+    radius = np.broadcast_to((filter_radius or np.inf) * norms(states)[:, None], values.shape)
     limit = (threshold / rate)[:, None]
     known = np.abs(values.real - limit) > radius
     flagged = np.flatnonzero(~known.all(axis=1))
@@ -109,12 +113,7 @@ def _state_space_modes(
     order = np.lexsort((-values.real, -kind), axis=1)[:, :n]
     values, known = np.take_along_axis(values, order, 1), np.take_along_axis(known, order, 1)
     values *= rate[:, None]
-    order = np.lexsort((values.real, values.imag), axis=1)
-    # Members of a coalesced pair differ in frequency by rounding only: the decaying one comes first.
-    ordered = np.take_along_axis(values, order, 1)
-    close = np.diff(ordered.imag, axis=1) <= TIE * ordered.imag[:, -1:]
-    rows, first = np.nonzero(close & (ordered.imag[:, :-1] > 0) & (np.diff(ordered.real, axis=1) < 0))
-    order[rows, first], order[rows, first + 1] = order[rows, first + 1], order[rows, first]
+    order = mode_order(values.imag, values.real, TIE)
     values, known = np.take_along_axis(values, order, 1), np.take_along_axis(known, order, 1)
     return values.imag / (2 * np.pi), values.real, known, decided_by
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hipuq.cea.bounds import Complex
+from hipuq.cea.numbering import TIE, mode_order
 from hipuq.cea.pencils import Array, Pencils
 from hipuq.errors import InputError
 
@@ -20,7 +21,7 @@ class ModeShapes:
     eigenvalue : (n,) complex array
         l [1/s], with Im l >= 0.
     shape : (n mode, n degree of freedom) complex array
-        y, normalised to unit modal mass ``y^H M y = 1`` [kg^-1/2], turned in phase so that the
+        y [m], normalised to a modal mass ``y^H M y`` of 1 kg m^2, turned in phase so that the
         largest entry is real and positive.
     strain_energy : (n,) array
         Mean over a cycle of the energy in the frictionless springs, ``y^H K0 y / 4`` [J].
@@ -113,7 +114,9 @@ def _eigenpairs(pencils: Pencils) -> tuple[Complex, Complex]:
         keep = np.lexsort((-values.real, -np.sign(values.imag)))[:n]
         values, vectors = values[keep], right[:n, keep].astype(np.complex128)
     values[np.argsort(np.abs(values), kind="stable")[: pencils.mechanisms[0]]] = 0.0
-    order = np.lexsort((values.real, values.imag))
+    tie = 0.0 if damping is None or not damping.any() else TIE
+    frequency = np.where(values == 0, -1.0, values.imag)
+    order = mode_order(frequency[None], values.real[None], tie)[0]
     return values[order], _unreduced(pencils.mass[0], vectors[:, order])
 
 

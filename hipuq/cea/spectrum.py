@@ -111,11 +111,16 @@ def solve(pencils: Pencils, *, growth_threshold: float = 0.0, certify: str = AUT
     free = ~damped
     if free.any():
         frequency[free], growth[free], known[free], margin[free], decided_by[free] = undamped_modes(
-            stiffness[free], mechanisms[free], growth_threshold, certify
+            stiffness[free], mechanisms[free], growth_threshold, certify, pencils.filter_radius
         )
     if damping is not None and damped.any():
         frequency[damped], growth[damped], known[damped], margin[damped], decided_by[damped] = damped_modes(
-            stiffness[damped], damping[damped], mechanisms[damped], growth_threshold, certify
+            stiffness[damped],
+            damping[damped],
+            mechanisms[damped],
+            growth_threshold,
+            certify,
+            pencils.filter_radius,
         )
     unstable = np.where(known, growth > growth_threshold, np.nan).astype(np.float32)
     # The certificate may find more zero roots than were declared: they are mechanisms too.

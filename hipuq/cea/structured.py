@@ -73,22 +73,27 @@ def structured_eigenvalues(matrices: Array, start: Complex, b: int) -> tuple[Com
     golden = np.exp(2j * np.pi * 0.381966 * np.arange(1, n + 1))
     values = start + 1e-9 * scale * golden
     step = np.full(values.shape, np.inf)
+    moving = np.ones(values.shape, bool)
     with np.errstate(all="ignore"):
         for _ in range(MAXIMUM_STEPS):
-            moving = step > 4 * EPS * scale
-            if not moving.any():
-                break
             rows = np.flatnonzero(moving.any(axis=1))
+            if not rows.size:
+                break
             delta = _correction(blocks.rows(rows), values[rows])
             delta[~(np.isfinite(delta) & moving[rows])] = 0.0
-            # A root whose correction no longer shrinks has reached its attainable accuracy.
             size = np.abs(delta)
-            stuck = (size >= 0.5 * step[rows]) & (size < 1e-10 * scale[rows])
-            values[rows] -= np.where(stuck, 0.0, delta)
-            step[rows] = np.where(stuck, 0.0, np.where(moving[rows], size, step[rows]))
-        condition = _structured_condition(blocks, values)
-    radius = SAFETY * EPS * condition
-    radius[~np.isfinite(radius) | (step > 4 * EPS * scale)] = np.inf
+            values[rows] -= delta
+            # Corrections of rounding size no longer shrink: the attainable accuracy is reached.
+            settled = (size <= 4 * EPS * scale[rows]) | (
+                (size <= 64 * EPS * scale[rows]) & (size >= 0.5 * step[rows])
+            )
+            step[rows] = np.where(moving[rows], size, step[rows])
+            moving[rows] &= ~settled
+        radius = SAFETY * EPS * _structured_condition(blocks, values)
+    radius[~np.isfinite(radius) | moving] = np.inf
+    # Two approximations of one root would leave another root out, and the trace wrong.
+    stray = np.abs(values.sum(axis=1) - np.trace(matrices, axis1=1, axis2=2))
+    radius[stray > radius.sum(axis=1)] = np.inf
     return _real_where_sure(values, radius), radius
 
 

@@ -18,7 +18,6 @@ from hipuq.cea.bounds import (
     CERTIFICATE,
     DOUBLE,
     EPS,
-    FILTER,
     NEVER,
     SAFETY,
     STRUCTURED,
@@ -29,6 +28,7 @@ from hipuq.cea.bounds import (
     scales,
 )
 from hipuq.cea.certificate import certify_damped, certify_undamped
+from hipuq.cea.numbering import mode_order
 from hipuq.cea.pencils import Array
 from hipuq.cea.structured import block_size, conjugate_pairs, structured_eigenvalues
 
@@ -36,7 +36,11 @@ Mask = NDArray[np.bool_]
 
 
 def undamped_modes(
-    stiffness: Array, mechanisms: NDArray[np.intp], threshold: float, certify: str = AUTO
+    stiffness: Array,
+    mechanisms: NDArray[np.intp],
+    threshold: float,
+    certify: str = AUTO,
+    filter_radius: float = 0.0,
 ) -> tuple[Array, Array, Mask, Array, NDArray[np.int8]]:
     """Return the modes of a batch by ascending frequency.
 
@@ -50,6 +54,8 @@ def undamped_modes(
         Growth rate above which a mode is unstable [1/s].
     certify : str
         ``"auto"``, ``"always"`` or ``"never"``.
+    filter_radius : float
+        As in `Pencils`.
 
     Returns
     -------
@@ -64,16 +70,15 @@ def undamped_modes(
     decided_by : (s,) array of int8
         The path that gave the verdicts.
     """
-    roots = _judged_roots(stiffness, mechanisms, threshold, certify)
+    roots = _judged_roots(stiffness, mechanisms, threshold, certify, filter_radius)
     values, rigid, known = roots.values, roots.rigid, roots.known
     root = np.sqrt(values)
     real = values.imag == 0
     frequency = np.where(rigid, 0.0, root.real / (2 * np.pi))
     growth = np.where(rigid, 0.0, np.where(real, root.imag, -root.imag))
     # LAPACK puts the members of a pair side by side, the decaying one first, and their frequencies
-    # are equal to the last bit: a stable sort keeps them so. Divergent modes all have frequency 0.
-    key = np.where(rigid, -np.inf, np.where(frequency > 0, frequency, np.minimum(values.real, 0.0)))
-    order = np.argsort(key, axis=1, kind="stable")
+    # are equal to the last bit: a stable sort keeps them so, also where two pairs coincide.
+    order = mode_order(np.where(rigid, -1.0, frequency), growth)
     frequency, growth, known = (
         np.take_along_axis(part, order, axis=1) for part in (frequency, growth, known)
     )
@@ -107,11 +112,13 @@ class _Roots:
         self.decided_by[rows] = path
 
 
-def _judged_roots(stiffness: Array, mechanisms: NDArray[np.intp], threshold: float, certify: str) -> _Roots:
+def _judged_roots(
+    stiffness: Array, mechanisms: NDArray[np.intp], threshold: float, certify: str, filter_radius: float
+) -> _Roots:
     """Return the roots w, which of them are mechanisms, of which the verdict is known, and by which path."""
     values: Complex = np.linalg.eigvals(stiffness).astype(np.complex128)
     norm = norms(stiffness)[:, None]
-    uniform = np.broadcast_to(FILTER * norm, values.shape)
+    uniform = np.broadcast_to((filter_radius or np.inf) * norm, values.shape)
     rigid, known = _judge(values, uniform, ZERO * norm, mechanisms, threshold)
     roots = _Roots(values, rigid, known, np.full(len(values), DOUBLE, np.int8))
     if certify == ALWAYS:

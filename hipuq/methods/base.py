@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from hipuq import schema
 from hipuq.errors import InputError, unknown_name
 from hipuq.inputs import Inputs
+from hipuq.methods.intervals import check_confidence
 from hipuq.sampling import BLOCK
 
 Array = NDArray[np.float64]
@@ -59,11 +60,15 @@ class Method:
         ------
         UnknownNameError
             If an option belongs to neither.
+        InputError
+            If a confidence is not one.
         """
         design, estimate = self.options("design"), self.options("estimate")
         for name in options:
             if name not in design and name not in estimate:
                 raise unknown_name(f"option of {self.title}", name, [*design, *estimate])
+        if "confidence" in options:
+            check_confidence(options["confidence"])
         return (
             {name: value for name, value in options.items() if name in design},
             {name: value for name, value in options.items() if name in estimate},
@@ -80,6 +85,9 @@ def rows_of(total: int, rows: slice | None) -> slice:
     """
     if rows is None:
         return slice(0, total)
+    ends = (rows.start, rows.stop) if isinstance(rows, slice) else (rows,)
+    if not isinstance(rows, slice) or not all(isinstance(end, (int, type(None))) for end in ends):
+        raise InputError(f"rows is {rows!r}: it must be a slice of integers, such as slice(0, 100)")
     start = 0 if rows.start is None else rows.start
     stop = total if rows.stop is None else rows.stop
     if rows.step not in (None, 1) or not 0 <= start < stop <= total:

@@ -146,7 +146,7 @@ def _plan(
     parts = REPLICATES[sampler] if replicates is None else check_count("replicates", replicates)
     if n % parts:
         raise InputError(f"n is {n}: it must be a multiple of the {parts} replicates")
-    check_size(sampler, n // parts)
+    check_size(sampler, n // parts, parts)
     name, _ = _stratum(inputs, stratify)
     return n // parts, parts, inputs.levels(name) if name else None
 

@@ -75,8 +75,15 @@ def levels_of(outcomes: xr.Dataset, inputs: Inputs) -> tuple[xr.Dataset | None, 
             dim = levels.attrs["dim"]
             if dim in outcomes.coords:
                 place = levels.get_index(dim).get_indexer(outcomes[dim].values)
-                if (place < 0).any():
-                    raise SchemaError(f"the outcomes hold a {dim} that the inputs do not have")
+                group = levels.attrs["group"]
+                other = (place < 0).any() or (
+                    group in outcomes.coords
+                    and not np.array_equal(levels[group].values[place], outcomes[group].values)
+                )
+                if other:
+                    raise SchemaError(
+                        f"the outcomes are of another {name} than the inputs: their {dim} does not fit"
+                    )
                 return levels, np.asarray(place, np.intp)
     return None, np.zeros(outcomes.sizes["sample"], np.intp)
 

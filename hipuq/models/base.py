@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hipuq import schema
 from hipuq.cea import ALWAYS, AUTO, NEVER, Pencils, Spectra, mode_shapes, solve
-from hipuq.errors import InputError, SchemaError, unknown_name
+from hipuq.errors import InputError, SchemaError, check_name, unknown_name
 from hipuq.inputs import Inputs
 from hipuq.models.parameter import Parameter
 from hipuq.variation import Nominal
@@ -49,12 +49,11 @@ class CEAModel(ABC):
         growth_threshold: float = 0.0,
         certify: str = AUTO,
     ) -> None:
-        if not (np.isfinite(growth_threshold) and growth_threshold >= 0):
+        if not (isinstance(growth_threshold, (int, float)) and 0 <= growth_threshold < np.inf):
             raise InputError(
                 f"growth_threshold is {growth_threshold}: it must be a finite number of 1/s, 0 or above"
             )
-        if certify not in (AUTO, ALWAYS, NEVER):
-            raise unknown_name("way to certify", certify, (AUTO, ALWAYS, NEVER))
+        check_name("way to certify", certify, (AUTO, ALWAYS, NEVER))
         self.preset = preset
         self.certify = certify
         self.parameters = dict(parameters)
@@ -120,8 +119,7 @@ class CEAModel(ABC):
             for name, parameter in self.parameters.items()
         }
         for name in distributions:
-            if name not in nominal:
-                raise unknown_name("parameter", name, nominal)
+            check_name("parameter", name, nominal)
         return Inputs.around(distributions, nominal)
 
     def nominal(self, **changes: ArrayLike) -> xr.Dataset:
@@ -138,21 +136,26 @@ class CEAModel(ABC):
         Dataset
             Over ``sample``, one variable for each parameter changed; valid samples.
         """
-        samples: dict[str, Any] = {}
-        size = 1
-        arrays = {}
-        for name, value in changes.items():
-            if name not in self.parameters:
-                raise unknown_name("parameter", name, self.parameters)
-            array = np.asarray(value)
-            dims = schema.PARAMETERS[name].dims
-            arrays[name] = array[None] if array.ndim < len(dims) else array
-            size = max(size, len(arrays[name]))
+        arrays = {
+            check_name("parameter", name, self.parameters): np.asarray(value)
+            for name, value in changes.items()
+        }
+        size = max((len(a) for n, a in arrays.items() if a.ndim > self.parameters[n].nominal.ndim), default=1)
+        data: dict[str, Any] = {}
         for name, array in arrays.items():
-            dims = schema.PARAMETERS[name].dims
-            shape = (size, *array.shape[1:])
-            samples[name] = (dims, np.broadcast_to(array, shape), schema.PARAMETERS[name].attrs)
-        return xr.Dataset(samples, coords={"sample": np.arange(size)})
+            variable, shape = schema.PARAMETERS[name], self.parameters[name].nominal.shape
+            try:
+                values = np.broadcast_to(array, (size, *shape)).copy()
+            except ValueError:
+                takes = shape or "one number"
+                raise InputError(
+                    f"{name} has the shape {array.shape}: it takes {takes} for each of {size} samples"
+                ) from None
+            data[name] = (variable.dims, values, variable.attrs)
+        samples = xr.Dataset(
+            data, coords={"sample": ("sample", np.arange(size), schema.COORDINATES["sample"].attrs)}
+        )
+        return schema.stamp(samples, f"nominal values of {self.label}", model=self.label)
 
     def pencils(self, samples: xr.Dataset) -> Pencils:
         """Return the matrices of the samples; what is not in them takes its nominal value.
@@ -199,11 +202,19 @@ class CEAModel(ABC):
     def _values(self, name: str, samples: xr.Dataset) -> Array:
         """Return the checked values of a parameter, (s,) or (s, size)."""
         parameter = self.parameters[name]
-        given = samples[name].transpose("sample", ...)
+        given, dims = samples[name], schema.PARAMETERS[name].dims
         shape = (samples.sizes["sample"], *parameter.nominal.shape)
-        if given.shape != shape:
-            dims = schema.PARAMETERS[name].dims
-            raise SchemaError(f"{name} has the shape {given.shape}: it needs {shape}, dims {dims}")
+        if set(given.dims) != set(dims) or given.transpose(*dims).shape != shape:
+            raise SchemaError(
+                f"{name} has the shape {given.shape}, dims {given.dims}: it needs {shape}, dims {dims}"
+            )
+        given = given.transpose(*dims)
+        for dim in dims[1:]:
+            if dim in given.coords:
+                numbers = np.arange(1, given.sizes[dim] + 1)
+                if not np.array_equal(np.sort(given[dim].values), numbers):
+                    raise SchemaError(f"{dim} of {name} is labelled {given[dim].values}: it needs {numbers}")
+                given = given.sortby(dim)
         values = np.ascontiguousarray(given.values, dtype=np.float64)
         parameter.check(name, values)
         return values
@@ -272,9 +283,9 @@ class CEAModel(ABC):
         Returns
         -------
         Dataset
-            ``shape_real``, ``shape_imag`` over (mode, dof), normalised to unit modal mass with the
-            largest entry real and positive; ``frequency``, ``growth_rate``, ``strain_energy``,
-            ``kinetic_energy``, ``friction_work``, ``damping_work`` over mode.
+            ``shape_real``, ``shape_imag`` over (mode, dof), normalised to a modal mass of
+            1 kg m^2 with the largest entry real and positive; ``frequency``, ``growth_rate``,
+            ``strain_energy``, ``kinetic_energy``, ``friction_work``, ``damping_work`` over mode.
         """
         shapes = mode_shapes(self.pencils(sample))
         energy = {
@@ -283,7 +294,7 @@ class CEAModel(ABC):
             "friction_work": "work of friction in a cycle",
             "damping_work": "work of damping in a cycle",
         }
-        shape_attrs = {"units": "kg^-1/2", "normalization": "unit modal mass, largest entry real"}
+        shape_attrs = {"units": "m", "normalization": "modal mass 1 kg m^2, largest entry real"}
         data: dict[str, Any] = {
             "frequency": ("mode", shapes.eigenvalue.imag / (2 * np.pi), schema.OUTCOMES["frequency"].attrs),
             "growth_rate": ("mode", shapes.eigenvalue.real, schema.OUTCOMES["growth_rate"].attrs),
@@ -294,7 +305,9 @@ class CEAModel(ABC):
         for name, long_name in energy.items():
             data[name] = ("mode", getattr(shapes, name), {"long_name": long_name, "units": "J"})
         dof = ("dof", np.arange(1, self.dofs + 1), {"long_name": "degree of freedom", "units": "1"})
-        return xr.Dataset(data, coords={**self.mode_coordinates(), "dof": dof})
+        found = xr.Dataset(data, coords={**self.mode_coordinates(), "dof": dof})
+        options = {"model": self.options}
+        return schema.stamp(found, "mode shapes", model=self.label, options=options, like=sample.attrs)
 
     def __repr__(self) -> str:
         return f"<hipuq model {self.label}: {self.dofs} modes, parameters {', '.join(self.parameters)}>"

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import cosdg, sindg
 
 from hipuq.cea import Pencils
-from hipuq.errors import InputError, unknown_name
+from hipuq.errors import InputError, check_name
 from hipuq.models.base import CEAModel
 from hipuq.models.parameter import Parameter
 
@@ -167,14 +167,12 @@ def two_dof(
     >>> list(hipuq.models.two_dof("hulten").parameters)
     ['friction', 'frequency_1', 'frequency_2', 'damping_1', 'damping_2']
     """
-    if preset not in PRESETS:
-        raise unknown_name("preset of two_dof", preset, PRESETS)
+    check_name("preset of two_dof", preset, PRESETS)
     values = dict(PRESETS[preset])
     for name, value in nominal.items():
-        if name not in values:
-            raise unknown_name(f"parameter of {preset}", name, values)
-        if np.shape(value) != ():
-            raise InputError(f"{name} has the shape {np.shape(value)}: it takes one number")
+        check_name(f"parameter of {preset}", name, values)
+        if np.ndim(value) != 0 or not isinstance(value, (int, float, np.number)):
+            raise InputError(f"{name} is {value!r}: it must be one number")
         values[name] = float(value)
     parameters = {}
     for name, value in values.items():

@@ -10,9 +10,14 @@ import numpy as np
 import xarray as xr
 
 from hipuq import schema
+from hipuq.errors import SchemaError
 
 MISSING = "n/a"
 """What stands for a number that does not exist."""
+
+
+STUDY_ATTRS = ("title", "description", "study", "seed", "report", "study_file", "hipuq_version")
+"""Attributes that the results of a study have."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +39,23 @@ class Table:
 
 
 def analyses(tree: xr.DataTree) -> list[str]:
-    """Return the names of the analyses in a results tree, in its order."""
+    """Return the names of the analyses in a results tree, in its order.
+
+    Raises
+    ------
+    SchemaError
+        If it is not that of a study.
+    """
+    missing = [key for key in STUDY_ATTRS if key not in tree.attrs]
+    if missing:
+        raise SchemaError(f"these are not the results of a study: the attribute {missing[0]!r} is missing")
     return [str(name) for name in tree.children]
 
 
 def estimates(tree: xr.DataTree, analysis: str) -> Iterator[tuple[str, xr.Dataset]]:
     """Give the results of an analysis: the outcome analysed and its Dataset."""
     for of, node in tree[analysis].children.items():
-        if "of" in node.attrs:
+        if "of" in node.attrs and ("probability" in node or "mean" in node):
             yield str(of), schema.check_results(node.to_dataset(inherit=False))
 
 

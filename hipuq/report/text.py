@@ -46,7 +46,7 @@ def _is_wide() -> bool:
 def _rich(table: Table) -> RichTable:
     made = RichTable(title=escape(table.title), title_justify="left", title_style="none", box=None)
     for i, column in enumerate(table.columns):
-        heading = "\n".join(textwrap.wrap(column, 10))
+        heading = "\n".join(textwrap.wrap(column, 10, break_long_words=False))
         made.add_column(escape(heading), justify="left" if i == 0 else "right", no_wrap=True)
     for row in table.rows:
         made.add_row(*map(escape, row))
