@@ -62,6 +62,11 @@ PROBABILITY_ANY_UNSTABLE = {
 # Certified: the same for single patterns of 8, nominal, by the oscillator left out.
 PROBABILITY_WITHOUT = {5: 0.88882764, 2: 0.90451516}
 
+# First onset of the preset oberst2016 at full contact with cosines of 60 digits: the pencil of the
+# exact geometry, solved for the zero of the pair's squared gap in 60-digit arithmetic.
+ONSET_OF_THE_EXACT_GEOMETRY = 0.0094972724694141030938
+
+
 # A point where LAPACK shows two complex pairs and exact arithmetic none: kc / k, friction.
 FALSE_FLUTTER = (1 / 0.2283, 0.0525)
 

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hipuq.cea.bounds import ZERO, Complex
+from hipuq.cea.exact import integers
 from hipuq.cea.pencils import Array
 
 Mask = NDArray[np.bool_]
@@ -66,16 +67,42 @@ def certify_undamped(stiffness: Array, start: Complex, mechanisms: int) -> Certi
         mechanisms, and any more of them. If there are fewer than declared nothing is known.
     """
     polynomial, exponent = _characteristic_polynomial(stiffness)
-    unit = 2.0**exponent
     zero = ZERO * float(np.linalg.norm(stiffness))
+    values = certify_polynomial(polynomial, exponent, start, mechanisms, zero)
+    if values is None:
+        return Certified(np.asarray(start, np.complex128), np.zeros(len(start), bool))
+    return Certified(values, np.ones(len(start), bool))
+
+
+def certify_polynomial(
+    polynomial: Any, exponent: int, start: Complex, mechanisms: int, zero: float
+) -> Complex | None:
+    """Prove which roots of a polynomial are real, and the signs of the real ones.
+
+    Parameters
+    ----------
+    polynomial : fmpz_poly
+        An integer multiple of the characteristic polynomial in w / 2**exponent.
+    exponent : int
+    start : (n,) complex array
+        Approximations of the w.
+    mechanisms : int
+        Number of zero roots by construction.
+    zero : float
+        Bound of the entries' rounding about zero.
+
+    Returns
+    -------
+    (n,) complex array or None
+        The roots, real and zero ones exactly so; None if that cannot be proved.
+    """
+    unit = 2.0**exponent
     centres, radius = _discs(polynomial, _distinct(start, mechanisms, zero) / unit)
     values = _proved(centres * unit, radius * unit, zero, mechanisms)
     if values is None:
         centres, radius, multiplicity = _isolated(polynomial)
         values = _proved(centres * unit, radius * unit, zero, mechanisms, multiplicity)
-    if values is None:
-        return Certified(np.asarray(start, np.complex128), np.zeros(len(start), bool))
-    return Certified(values, np.ones(len(start), bool))
+    return values
 
 
 def _proved(
@@ -108,7 +135,8 @@ def _proved(
         # Isolated roots are apart by proof, though doubles may not tell.
         touching[...] = False
     real = centres.imag == 0
-    clear = inside | np.where(real, np.abs(centres) - radius > zero, np.abs(centres.imag) > radius)
+    off_axis = (np.abs(centres.imag) > radius) if multiplicity is None else ~real
+    clear = inside | np.where(real, np.abs(centres) - radius > zero, off_axis)
     if touching.any() or not clear.all() or count[inside].sum() < mechanisms:
         return None
     return np.repeat(np.where(inside, 0.0, centres), count)
@@ -164,13 +192,7 @@ def _characteristic_polynomial(matrix: Array, shift: float = 0.0) -> tuple[Any, 
     from flint import fmpz_mat
 
     n = len(matrix)
-    mantissa, exponent = np.frexp(np.append(matrix.ravel(), shift))
-    whole = (mantissa * 2.0**53).astype(np.int64)
-    power = exponent.astype(int) - 53
-    used = whole != 0
-    # Finer than the entries, so that centres of discs can be given as integers too.
-    lowest = min(int(power[used].min()), int(exponent[used].max()) - 80) if used.any() else 0
-    entries = [int(a) << int(b - lowest) if a else 0 for a, b in zip(whole, power, strict=True)]
+    entries, lowest = integers(np.append(matrix.ravel(), shift))
     for i in range(n):
         entries[i * (n + 1)] += entries[-1]
     return fmpz_mat(n, n, entries[:-1]).charpoly(), lowest
@@ -212,17 +234,13 @@ def _discs(polynomial: Any, values: Complex) -> tuple[Complex, Array]:
 
 
 def _modulus(coefficients: list[Any], x: int, y: int, bits: int) -> float:
-    """Return |p(x + iy)| / 2**bits from exact integers, coefficients from the highest down."""
+    """Return |p(x + iy) / lead| / 2**bits from exact integers, coefficients from the highest down."""
     a, b = coefficients[0] * 0, coefficients[0] * 0
     for c in coefficients:
         a, b = a * x - b * y + c, a * y + b * x
-    return float(np.hypot(_scaled(int(a), bits), _scaled(int(b), bits)))
-
-
-def _scaled(number: int, bits: int) -> float:
-    """Return number / 2**bits, rounded."""
-    drop = max(0, number.bit_length() - 64)
-    return float(np.ldexp(float(number >> drop), drop - bits))
+    # Division of whole numbers rounds once, however long they are.
+    whole = int(coefficients[0]) << bits
+    return float(np.hypot(int(a) / whole, int(b) / whole))
 
 
 def _isolated(polynomial: Any) -> tuple[Complex, Array, NDArray[np.intp]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -112,6 +112,22 @@ class Pencils:
         back = inverse.transpose(0, 2, 1)
         damping = None if self.damping is None else inverse @ self.damping @ back
         return inverse @ stiffness @ back, damping
+
+    def reduced_parts(self) -> tuple[Array, Array]:
+        """Return ``L^-1 K0 L^-T`` and ``L^-1 K1 L^-T``, the parts of A = A0 + mu A1.
+
+        Returns
+        -------
+        constant, slope : (s, n, n) array
+            A0 and A1 [1/s^2].
+        """
+        none = np.zeros_like(self.friction_stiffness)
+        parts = (
+            replace(self, stiffness=part, friction_stiffness=none, damping=None)
+            for part in (self.stiffness, self.friction_stiffness)
+        )
+        constant, slope = (part.reduced()[0] for part in parts)
+        return constant, slope
 
     def rows(self, index: Any) -> Pencils:
         """Return the pencils of the samples that `index` selects."""

@@ -70,7 +70,7 @@ def undamped_modes(
     decided_by : (s,) array of int8
         The path that gave the verdicts.
     """
-    roots = _judged_roots(stiffness, mechanisms, threshold, certify, filter_radius)
+    roots = judged_roots(stiffness, mechanisms, threshold, certify, filter_radius)
     values, rigid, known = roots.values, roots.rigid, roots.known
     root = np.sqrt(values)
     real = values.imag == 0
@@ -91,7 +91,7 @@ def undamped_modes(
 
 
 @dataclass
-class _Roots:
+class Roots:
     """Roots w of a batch while they are judged: (s, n) but for `decided_by`, (s,)."""
 
     values: Complex
@@ -112,15 +112,15 @@ class _Roots:
         self.decided_by[rows] = path
 
 
-def _judged_roots(
+def judged_roots(
     stiffness: Array, mechanisms: NDArray[np.intp], threshold: float, certify: str, filter_radius: float
-) -> _Roots:
+) -> Roots:
     """Return the roots w, which of them are mechanisms, of which the verdict is known, and by which path."""
     values: Complex = np.linalg.eigvals(stiffness).astype(np.complex128)
     norm = norms(stiffness)[:, None]
     uniform = np.broadcast_to((filter_radius or np.inf) * norm, values.shape)
     rigid, known = _judge(values, uniform, ZERO * norm, mechanisms, threshold)
-    roots = _Roots(values, rigid, known, np.full(len(values), DOUBLE, np.int8))
+    roots = Roots(values, rigid, known, np.full(len(values), DOUBLE, np.int8))
     if certify == ALWAYS:
         _certify(roots, np.arange(len(values)), stiffness, mechanisms, threshold)
         return roots
@@ -154,7 +154,7 @@ def _judged_roots(
 
 
 def _certify(
-    roots: _Roots, rows: NDArray[np.intp], stiffness: Array, mechanisms: NDArray[np.intp], threshold: float
+    roots: Roots, rows: NDArray[np.intp], stiffness: Array, mechanisms: NDArray[np.intp], threshold: float
 ) -> None:
     """Let the certificate judge some samples, one by one."""
     for row in rows:
