@@ -70,7 +70,8 @@ def conditioned_eigenvalues(matrices: Array) -> tuple[Complex, Array]:
     except np.linalg.LinAlgError:
         left = np.stack([_inverse(one) for one in right])
     # The rows of the inverse are left eigenvectors with y^H x = 1.
-    condition = np.linalg.norm(left, axis=2) * np.linalg.norm(right, axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        condition = np.linalg.norm(left, axis=2) * np.linalg.norm(right, axis=1)
     condition = np.where(np.isfinite(condition), condition, np.inf)
     return values.astype(np.complex128), SAFETY * EPS * norms(matrices)[:, None] * condition
 

@@ -8,13 +8,15 @@ them (B. T. Smith, J. ACM 17 (1970) 661). Where those discs do not settle it, th
 from the polynomial itself, multiple ones included.
 
 What is proved is the verdict on the matrix A = M^(-1/2) K M^(-1/2) as rounded to doubles, mechanisms
-apart; in damped problems that on the pencil of A and D. Of a model's declared mechanisms it is proved
+apart; in damped problems that on the pencil of A and D, which the mechanisms have been projected out
+of in double precision. Of a model's declared mechanisms it is proved
 that exactly so many roots lie within the rounding of the entries about zero. It is not proved that
 those entries are the right physics.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -22,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.bounds import ZERO, Complex
+from hipuq.cea.bounds import EPS, SAFETY, ZERO, Complex
 from hipuq.cea.exact import integers
 from hipuq.cea.pencils import Array
 
@@ -67,15 +69,14 @@ def certify_undamped(stiffness: Array, start: Complex, mechanisms: int) -> Certi
         mechanisms, and any more of them. If there are fewer than declared nothing is known.
     """
     polynomial, exponent = _characteristic_polynomial(stiffness)
-    zero = ZERO * float(np.linalg.norm(stiffness))
-    values = certify_polynomial(polynomial, exponent, start, mechanisms, zero)
+    values = certify_polynomial(polynomial, exponent, start, mechanisms, _norm(stiffness))
     if values is None:
         return Certified(np.asarray(start, np.complex128), np.zeros(len(start), bool))
     return Certified(values, np.ones(len(start), bool))
 
 
 def certify_polynomial(
-    polynomial: Any, exponent: int, start: Complex, mechanisms: int, zero: float
+    polynomial: Any, exponent: int, start: Complex, mechanisms: int, norm: float
 ) -> Complex | None:
     """Prove which roots of a polynomial are real, and the signs of the real ones.
 
@@ -88,27 +89,26 @@ def certify_polynomial(
         Approximations of the w.
     mechanisms : int
         Number of zero roots by construction.
-    zero : float
-        Bound of the entries' rounding about zero.
+    norm : float
+        Of the matrix: roots within SAFETY * EPS times it are zero, declared ones within ZERO times it.
 
     Returns
     -------
     (n,) complex array or None
         The roots, real and zero ones exactly so; None if that cannot be proved.
     """
-    unit = 2.0**exponent
-    centres, radius = _discs(polynomial, _distinct(start, mechanisms, zero) / unit)
-    values = _proved(centres * unit, radius * unit, zero, mechanisms)
+    centres, radius = _discs(polynomial, exponent, _distinct(start, mechanisms, SAFETY * EPS * norm))
+    values = _proved(centres, radius, norm, mechanisms)
     if values is None:
-        centres, radius, multiplicity = _isolated(polynomial)
-        values = _proved(centres * unit, radius * unit, zero, mechanisms, multiplicity)
+        centres, radius, multiplicity = _isolated(polynomial, exponent)
+        values = _proved(centres, radius, norm, mechanisms, multiplicity)
     return values
 
 
 def _proved(
     centres: Complex,
     radius: Array,
-    zero: float,
+    norm: float,
     mechanisms: int,
     multiplicity: NDArray[np.intp] | None = None,
 ) -> Complex | None:
@@ -118,14 +118,21 @@ def _proved(
     ----------
     centres, radius : (k,) array
         Discs: each holds one root if it touches no other, or `multiplicity` equal ones.
-    zero : float
-        Bound of the entries' rounding.
+    norm : float
+        Of the matrix.
     mechanisms : int
     multiplicity : (k,) array of int, optional
         1 by default.
     """
     count = np.ones(len(centres), np.intp) if multiplicity is None else multiplicity
+    zero = SAFETY * EPS * norm
     inside = np.abs(centres) + radius <= zero
+    if count[inside].sum() < mechanisms:
+        # The declaration is believed as far as ZERO, but then no more than it says.
+        zero = ZERO * norm
+        inside = np.abs(centres) + radius <= zero
+        if count[inside].sum() != mechanisms:
+            return None
     gaps = np.abs(centres[:, None] - centres[None, :])
     touching = gaps <= radius[:, None] + radius[None, :]
     np.fill_diagonal(touching, False)
@@ -137,7 +144,7 @@ def _proved(
     real = centres.imag == 0
     off_axis = (np.abs(centres.imag) > radius) if multiplicity is None else ~real
     clear = inside | np.where(real, np.abs(centres) - radius > zero, off_axis)
-    if touching.any() or not clear.all() or count[inside].sum() < mechanisms:
+    if touching.any() or not clear.all():
         return None
     return np.repeat(np.where(inside, 0.0, centres), count)
 
@@ -165,22 +172,22 @@ def certify_damped(stiffness: Array, damping: Array, threshold: float, values: C
         Whether the side of each is proved to be the one that its approximation is on.
     """
     n = len(stiffness)
-    scale = 2.0 ** np.round(np.log2(max(np.sqrt(np.linalg.norm(stiffness)), 1e-300)))
+    size = math.sqrt(_norm(stiffness)) or _norm(damping) or 1.0
+    scale = 2.0 ** math.frexp(size)[1]
     companion = np.zeros((2 * n, 2 * n))
     companion[:n, n:] = np.eye(n)
     companion[n:, :n] = -stiffness / scale**2
     companion[n:, n:] = -damping / scale
     polynomial, exponent = _characteristic_polynomial(companion, shift=-threshold / scale)
-    unit = 2.0**exponent
     start = _distinct(values / scale - threshold / scale, 0, 0.0)
-    centres, radius = _discs(polynomial, start / unit)
+    centres, radius = _discs(polynomial, exponent, start)
     clear = np.abs(centres.real) > radius
     if clear.all():
         same: Mask = np.sign(centres.real) == np.sign(values.real - threshold)
         return same
-    isolated, around, multiplicity = _isolated(polynomial)
-    right = int(multiplicity[isolated.real > around].sum())
-    left = int(multiplicity[isolated.real < -around].sum())
+    roots = polynomial.complex_roots()
+    right = sum(count for root, count in roots if root.real > 0)
+    left = sum(count for root, count in roots if root.real < 0)
     # Sides are counts; they belong to the approximations if those have the same counts.
     claimed = int((values.real > threshold).sum())
     proved = right == claimed and left == 2 * n - claimed
@@ -198,6 +205,12 @@ def _characteristic_polynomial(matrix: Array, shift: float = 0.0) -> tuple[Any, 
     return fmpz_mat(n, n, entries[:-1]).charpoly(), lowest
 
 
+def _norm(matrix: Array) -> float:
+    """Return the Frobenius norm, also where squares of the entries are out of range."""
+    largest = float(np.abs(matrix).max())
+    return largest * float(np.linalg.norm(matrix / largest)) if largest > 0 else 0.0
+
+
 def _distinct(values: Complex, mechanisms: int, zero: float) -> Complex:
     """Return approximations that all differ: mechanisms spread about zero, equal ones moved apart."""
     spread = values.copy()
@@ -213,39 +226,57 @@ def _distinct(values: Complex, mechanisms: int, zero: float) -> Complex:
     return spread
 
 
-def _discs(polynomial: Any, values: Complex) -> tuple[Complex, Array]:
-    """Return centres, rounded to integers, and Smith's radii; infinite where centres coincide."""
+def _discs(polynomial: Any, exponent: int, values: Complex) -> tuple[Complex, Array]:
+    """Return centres, integers times 2**exponent, and Smith's radii; infinite where centres coincide.
+
+    The products are added up as logarithms: tight clusters would leave the range of doubles.
+    """
     n = len(values)
-    bits = max(0, int(np.ceil(np.log2(np.abs(values).max(initial=1.0)))))
-    real = [int(x) for x in values.real]
-    imag = [int(x) for x in values.imag]
+    real = [_whole(x, exponent) for x in values.real.tolist()]
+    imag = [_whole(x, exponent) for x in values.imag.tolist()]
     coefficients = list(reversed(polynomial.coeffs()))
-    size = np.empty(n)
-    for i, (x, y) in enumerate(zip(real, imag, strict=True)):
-        size[i] = _modulus(coefficients, x, y, bits * n)
-    scale = 2.0**bits
-    centres = np.array(real, np.float64) / scale + 1j * (np.array(imag, np.float64) / scale)
+    lead = math.log2(abs(int(coefficients[0])))
+    size = np.array([_log_modulus(coefficients, x, y) for x, y in zip(real, imag, strict=True)])
+    parts = [np.array([_scaled(x, exponent) for x in part]) for part in (real, imag)]
+    centres = parts[0] + 1j * parts[1]
     gaps = np.abs(centres[:, None] - centres[None, :])
     np.fill_diagonal(gaps, 1.0)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        radius = n * size / gaps.prod(axis=1)
-    radius = np.where(np.isfinite(radius), radius, np.inf) * _OUTWARDS
-    return np.asarray(centres * scale, np.complex128), radius * scale
+        radius = n * np.exp2(size - lead + n * exponent - np.log2(gaps).sum(axis=1))
+    return centres, np.where(np.isnan(radius), np.inf, radius) * _OUTWARDS
 
 
-def _modulus(coefficients: list[Any], x: int, y: int, bits: int) -> float:
-    """Return |p(x + iy) / lead| / 2**bits from exact integers, coefficients from the highest down."""
+def _whole(number: float, exponent: int) -> int:
+    """Return number / 2**exponent, rounded down to an integer."""
+    mantissa, power = math.frexp(number)
+    shift = power - 53 - exponent
+    whole = int(mantissa * 2.0**53)
+    return whole << shift if shift >= 0 else whole >> -shift
+
+
+def _log_modulus(coefficients: list[Any], x: int, y: int) -> float:
+    """Return log2 |p(x + iy)| from exact integers, coefficients from the highest down."""
     a, b = coefficients[0] * 0, coefficients[0] * 0
     for c in coefficients:
         a, b = a * x - b * y + c, a * y + b * x
-    # Division of whole numbers rounds once, however long they are.
-    whole = int(coefficients[0]) << bits
-    return float(np.hypot(int(a) / whole, int(b) / whole))
+    a, b = int(a), int(b)
+    drop = max(0, max(a.bit_length(), b.bit_length()) - 500)
+    modulus = math.hypot(float(a >> drop), float(b >> drop))
+    return math.log2(modulus) + drop if modulus > 0 else -math.inf
 
 
-def _isolated(polynomial: Any) -> tuple[Complex, Array, NDArray[np.intp]]:
+def _scaled(number: int, exponent: int) -> float:
+    """Return number * 2**exponent, rounded."""
+    drop = max(0, number.bit_length() - 64)
+    return math.ldexp(float(number >> drop), drop + exponent)
+
+
+def _isolated(polynomial: Any, exponent: int) -> tuple[Complex, Array, NDArray[np.intp]]:
     """Return enclosures of the distinct roots and their multiplicities; real ones are exactly real."""
-    roots = polynomial.complex_roots()
+    from flint import arb
+
+    unit = arb(2) ** exponent
+    roots = [(root * unit, count) for root, count in polynomial.complex_roots()]
     centres = np.array([complex(float(z.real.mid()), float(z.imag.mid())) for z, _ in roots])
     inner = np.array([float(z.real.rad()) + float(z.imag.rad()) for z, _ in roots])
     radius = (inner + 2.0**-51 * np.abs(centres)) * _OUTWARDS

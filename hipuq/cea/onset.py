@@ -17,12 +17,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.bounds import AUTO, ZERO, Complex, norms
+from hipuq.cea.bounds import AUTO, Complex, norms
 from hipuq.cea.certificate import certify_polynomial
 from hipuq.cea.exact import ExactPencil
 from hipuq.cea.gaps import Point, apart, merging, single
 from hipuq.cea.pencils import Array, Pencils
-from hipuq.cea.structured import block_size, structured_eigenvalues
+from hipuq.cea.structured import block_sizes, structured_eigenvalues
 from hipuq.cea.undamped import judged_roots
 from hipuq.errors import InputError
 
@@ -131,7 +131,7 @@ class _Search:
         self.mechanisms = pencils.mechanisms
         self.filter_radius = pencils.filter_radius
         self.scale = norms(self.constant) / np.sqrt(self.constant.shape[1])
-        self.zero = ZERO * norms(self.constant)
+        self.norm = norms(self.constant)
         self._exact: dict[int, ExactPencil] = {}
 
     def points(self, rows: NDArray[np.intp], friction: Array) -> list[Point]:
@@ -166,7 +166,7 @@ class _Search:
         )
         exact = self.exact(i)
         values = certify_polynomial(
-            exact.at(point.friction), exact.exponent, near.astype(np.complex128), m, self.zero[i]
+            exact.at(point.friction), exact.exponent, near.astype(np.complex128), m, self.norm[i]
         )
         if values is None:
             raise InputError(
@@ -194,8 +194,8 @@ class _Search:
 
     def _within_rounding(self, i: int, group: list[Boundary]) -> bool:
         """Say whether no pair of a window is proved by more than the rounding of its entries."""
-        b = block_size(self.constant[[i]] + self.slope[[i]])
-        if b is None:
+        b = int(block_sizes(self.constant[[i]] + self.slope[[i]])[0])
+        if not b:
             return False
         friction = np.linspace(group[0].friction, group[-1].friction, 17)
         matrices = self.constant[i] + friction[:, None, None] * self.slope[i]
@@ -240,7 +240,7 @@ class _Search:
         for side in (friction * (1 - SIDE), friction * (1 + SIDE)):
             gap, middle = _exact_gap(exact, side, centre, unit)
             near = self._approximations(i, side, middle, gap)
-            values = certify_polynomial(exact.at(side), exact.exponent, near, m, self.zero[i])
+            values = certify_polynomial(exact.at(side), exact.exponent, near, m, self.norm[i])
             counts.append(None if values is None else int((values.imag > 0).sum()))
             if values is not None and gap < 0:
                 frequency = np.sqrt(values).real

@@ -13,6 +13,10 @@ from hipuq.errors import InputError
 Array = NDArray[np.float64]
 
 
+LARGEST = 1e140
+"""Largest entry: squares of entries must stay in the range of doubles."""
+
+
 @dataclass(frozen=True)
 class Pencils:
     """Matrices of a batch of s samples with n degrees of freedom.
@@ -73,6 +77,8 @@ class Pencils:
             if value is not None and not np.isfinite(value).all():
                 bad = int(np.argmin(np.isfinite(value).reshape(s, -1).all(axis=1)))
                 raise InputError(f"{name} holds a value that is not finite, first in sample {bad}")
+            if value is not None and np.abs(value).max(initial=0.0) > LARGEST:
+                raise InputError(f"{name} holds a value above {LARGEST:g}: choose other units")
         if self.mass.ndim == 2 and not (self.mass > 0).all():
             bad = int(np.argmin((self.mass > 0).all(axis=1)))
             raise InputError(f"mass must be positive, it is {self.mass[bad].min()} in sample {bad}")

@@ -20,12 +20,12 @@ MAXIMUM_STEPS = 60
 
 SAFETY = 100.0
 """Factor on the first-order bound eps * structured condition number, for the rounding in n block
-steps of the LU. Against exact verdicts a factor of 1 left no wrong one;
+steps of the LU: seven times the largest error seen, 13.9, in 4,400 samples compared with exact roots;
 ``tests/validate_filter.py`` repeats the comparison."""
 
 
-def block_size(matrices: Array) -> int | None:
-    """Return the block size of block tridiagonal matrices.
+def block_sizes(matrices: Array) -> NDArray[np.intp]:
+    """Return the block size of each matrix of a batch.
 
     Parameters
     ----------
@@ -33,16 +33,19 @@ def block_size(matrices: Array) -> int | None:
 
     Returns
     -------
-    int or None
+    (s,) array of int
         The smallest b that divides n and leaves at least three blocks, such that all entries outside
-        the three block diagonals are zero in every matrix; None if there is none.
+        the three block diagonals are zero; 0 if there is none.
     """
     n = matrices.shape[1]
-    filled = np.argwhere((matrices != 0).any(axis=0))
-    for b in range(1, n // 3 + 1):
-        if n % b == 0 and (np.abs(filled[:, 0] // b - filled[:, 1] // b) <= 1).all():
-            return b
-    return None
+    index = np.arange(n)
+    filled = matrices != 0
+    sizes = np.zeros(len(matrices), np.intp)
+    for b in range(n // 3, 0, -1):
+        if n % b == 0:
+            outside = np.abs(index[:, None] // b - index // b) > 1
+            sizes[~filled[:, outside].any(axis=1)] = b
+    return sizes
 
 
 def structured_eigenvalues(matrices: Array, start: Complex, b: int) -> tuple[Complex, Array]:
@@ -62,8 +65,9 @@ def structured_eigenvalues(matrices: Array, start: Complex, b: int) -> tuple[Com
         Real ones have an imaginary part of exactly 0 where the bound says that they are real.
     radius : (s, n) array
         SAFETY * eps * structured condition number: how far an eigenvalue moves if every entry of the
-        block tridiagonal moves by its own relative rounding. Infinite where the iteration did not
-        converge.
+        block tridiagonal moves by its own relative rounding, or SAFETY * eps * scale if that is more;
+        and n / 2 times the last correction, because towards an n-fold root the iteration converges
+        linearly. Infinite where it did not converge.
     """
     blocks = _Blocks(matrices, b)
     n = matrices.shape[1]
@@ -89,7 +93,8 @@ def structured_eigenvalues(matrices: Array, start: Complex, b: int) -> tuple[Com
             )
             step[rows] = np.where(moving[rows], size, step[rows])
             moving[rows] &= ~settled
-        radius = SAFETY * EPS * _structured_condition(blocks, values)
+        radius = SAFETY * EPS * np.maximum(_structured_condition(blocks, values), scale)
+        radius += 0.5 * n * step
     radius[~np.isfinite(radius) | moving] = np.inf
     # Two approximations of one root would leave another root out, and the trace wrong.
     stray = np.abs(values.sum(axis=1) - np.trace(matrices, axis1=1, axis2=2))
@@ -136,9 +141,12 @@ def _inverse(matrices: Complex) -> Complex:
         (p, q), (r, t) = np.moveaxis(matrices, (-2, -1), (0, 1))
         adjoint = np.stack([np.stack([t, -q], -1), np.stack([-r, p], -1)], -2)
         return np.asarray(adjoint / (p * t - q * r)[..., None, None], dtype=np.complex128)
-    # A tiny shift keeps an exactly singular block from stopping the whole batch.
-    shift = np.finfo(np.float64).tiny * np.eye(b)
-    return np.asarray(np.linalg.inv(matrices + shift), dtype=np.complex128)
+    try:
+        return np.asarray(np.linalg.inv(matrices), dtype=np.complex128)
+    except np.linalg.LinAlgError:
+        singular = (np.linalg.slogdet(matrices)[0] == 0)[..., None, None]
+        inverse = np.linalg.inv(np.where(singular, np.eye(b), matrices))
+        return np.where(singular, np.inf, inverse).astype(np.complex128)
 
 
 def _shifted(blocks: _Blocks, values: Complex) -> list[Complex]:
@@ -227,27 +235,38 @@ def _real_where_sure(values: Complex, radius: Array) -> Complex:
     return np.where(real, values.real.astype(np.complex128), values)
 
 
-def conjugate_pairs(values: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+def conjugate_pairs(values: Complex, radius: Array) -> tuple[Complex, Array]:
     """Return roots of real matrices with exact conjugates side by side, the upper one first.
 
     Parameters
     ----------
     values : (s, n) complex array
         Roots; exactly real ones count as real.
+    radius : (s, n) array
+        Their error bounds.
 
     Returns
     -------
     values : (s, n) complex array
         Real roots ascending, then the pairs.
-    paired : (s,) array of bool
-        Whether there are as many upper as lower roots; where not, the roots are as they came.
+    radius : (s, n) array
+        The bounds in the same order, widened by what a root was moved. Infinite where there are not
+        as many upper as lower roots; those are as they came.
     """
-    ordered = values.copy()
+    ordered, bounds = values.copy(), radius.copy()
     paired = (values.imag > 0).sum(axis=1) == (values.imag < 0).sum(axis=1)
+    bounds[~paired] = np.inf
     for row in np.flatnonzero(paired):
-        own = values[row]
-        upper = own[own.imag > 0]
-        upper = upper[np.lexsort((upper.imag, upper.real))]
-        pairs = np.stack([upper, upper.conj()], axis=1).ravel()
-        ordered[row] = np.concatenate([np.sort(own[own.imag == 0].real), pairs])
-    return ordered, paired
+        own, bound = values[row], radius[row]
+        order = np.lexsort((np.abs(own.imag), own.real))
+        real, upper = order[own.imag[order] == 0], order[own.imag[order] > 0]
+        lower = list(order[own.imag[order] < 0])
+        index, widened = list(real), list(bound[real])
+        for k in upper:
+            distance = np.abs(own[lower] - own[k].conj())
+            partner = lower.pop(int(distance.argmin()))
+            index += [k, partner]
+            widened += [max(bound[k], bound[partner]) + distance.min()] * 2
+        ordered[row], bounds[row] = own[index], widened
+        ordered[row, len(real) + 1 :: 2] = ordered[row, len(real) :: 2].conj()
+    return ordered, bounds

@@ -30,7 +30,7 @@ from hipuq.cea.bounds import (
 from hipuq.cea.certificate import certify_damped, certify_undamped
 from hipuq.cea.numbering import mode_order
 from hipuq.cea.pencils import Array
-from hipuq.cea.structured import block_size, conjugate_pairs, structured_eigenvalues
+from hipuq.cea.structured import block_sizes, conjugate_pairs, structured_eigenvalues
 
 Mask = NDArray[np.bool_]
 
@@ -140,15 +140,14 @@ def judged_roots(
         roots.take(rows, values, judged, DOUBLE)
     rows = roots.open()
     if rows.size and certify != NEVER:
-        part = stiffness[rows]
-        size = block_size(part)
-        if size is not None:
-            values, radius = structured_eigenvalues(part, roots.values[rows], size)
-            values, paired = conjugate_pairs(values)
-            radius[~paired] = np.inf
-            zero = np.maximum(ZERO * norm[rows], radius)
-            judged = _judge(values, radius, zero, mechanisms[rows], threshold)
-            roots.take(rows, values, judged, STRUCTURED)
+        sizes = block_sizes(stiffness[rows])
+        for size in np.unique(sizes[sizes > 0]):
+            same = rows[sizes == size]
+            values, radius = structured_eigenvalues(stiffness[same], roots.values[same], int(size))
+            values, radius = conjugate_pairs(values, radius)
+            zero = np.maximum(ZERO * norm[same], radius)
+            judged = _judge(values, radius, zero, mechanisms[same], threshold)
+            roots.take(same, values, judged, STRUCTURED)
         _certify(roots, roots.open(), stiffness, mechanisms, threshold)
     return roots
 
@@ -163,9 +162,9 @@ def _certify(
         if not proof.known.all():
             roots.known[row] = False
             continue
-        values, paired = conjugate_pairs(proof.values[None])
+        values, radius = conjugate_pairs(proof.values[None], np.zeros((1, len(proof.values))))
         rigid = np.argsort(np.argsort(np.abs(values), axis=1, kind="stable"), axis=1) < m
-        known = np.broadcast_to(paired[:, None], values.shape)
+        known = np.isfinite(radius)
         if threshold > 0 and known.all():
             root = np.sqrt(-values[0])
             sides = certify_damped(
