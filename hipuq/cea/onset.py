@@ -251,12 +251,16 @@ class _Search:
 
     def _approximations(self, i: int, friction: float, middle: float, gap: float) -> Complex:
         """Return approximations of all roots beside a boundary, those of the pair from its squared gap."""
-        point = self.points(np.array([i]), np.array([friction]))[0]
-        near = np.concatenate([point.real, point.pairs, point.pairs.conj()]).astype(np.complex128)
-        near = np.delete(near, np.argsort(np.abs(near - middle), kind="stable")[:2])
+        matrix = (self.constant[i] + friction * self.slope[i])[None]
+        near = np.linalg.eigvals(matrix).astype(np.complex128)
+        size = int(block_sizes(matrix)[0])
+        if size:
+            near, _ = structured_eigenvalues(matrix, near, size)
+        m = int(self.mechanisms[i])
+        rest = near[0][np.argsort(np.abs(near[0]), kind="stable")[m:]]
+        rest = np.delete(rest, np.argsort(np.abs(rest - middle), kind="stable")[:2])
         half = np.sqrt(complex(gap)) / 2
-        rigid = np.zeros(int(self.mechanisms[i]))
-        return np.concatenate([rigid, near, [middle + half, middle - half]])
+        return np.concatenate([np.zeros(m), rest, [middle + half, middle - half]])
 
 
 def _exact_gap(exact: ExactPencil, friction: float, centre: float, unit: float) -> tuple[float, float]:
