@@ -144,7 +144,7 @@ def plain_verdicts(pencils: Pencils, threshold: float) -> tuple[np.ndarray, np.n
     if damping is None:
         norm = norms(matrices)[:, None]
         values = np.linalg.eigvals(matrices).astype(complex)
-        radius = np.broadcast_to(pencils.filter_radius * norm, values.shape)
+        radius = np.broadcast_to((pencils.filter_radius or np.inf) * norm, values.shape)
         rigid, known = _judge(values, radius, ZERO * norm, mechanisms, threshold)
         growth = np.where(rigid, 0.0, np.abs(np.sqrt(-values).real)).max(axis=1)
         verdict = growth > threshold
@@ -165,7 +165,7 @@ def plain_verdicts(pencils: Pencils, threshold: float) -> tuple[np.ndarray, np.n
         above = np.linalg.eigvals(states).real - threshold / rate
         norm = norms(states)
         verdict[rows] = (above > 0).any(axis=1)
-        cleared[rows] = (np.abs(above) > pencils.filter_radius * norm[:, None]).all(axis=1)
+        cleared[rows] = (np.abs(above) > (pencils.filter_radius or np.inf) * norm[:, None]).all(axis=1)
         distance[rows] = np.abs(above.max(axis=1)) / norm
     return verdict, cleared, distance
 
