@@ -198,7 +198,10 @@ def as_input(name: str, value: object, known: Nominal | None) -> Input:
         )
     if value.nominal is None and known is None:
         raise InputError(f"{name} is {value.how} to a nominal value that nobody knows: give nominal=")
-    nominal = known.values if known and value.nominal is None else np.asarray(value.nominal, np.float64)
+    try:
+        nominal = known.values if known and value.nominal is None else np.asarray(value.nominal, np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"nominal of {name} is {value.nominal!r}: it must be numbers") from None
     dims = known.dims if known else ((value.each,) if value.each and nominal.ndim else ())
     if known and nominal.shape not in ((), known.values.shape):
         raise InputError(f"nominal of {name} has the shape {nominal.shape}: it needs {known.values.shape}")

@@ -217,3 +217,8 @@ def test_inputs_that_do_not_go_together_are_refused():
             a=hipuq.relative(cp.Uniform(0, 1), each="part", nominal=[1.0, 2.0]),
             b=hipuq.relative(cp.Uniform(0, 1), each="part", nominal=[1.0, 2.0, 3.0]),
         )
+
+
+def test_a_nominal_value_that_is_no_number_is_named():
+    with pytest.raises(InputError, match="nominal of a is 'x'"):
+        hipuq.Inputs(a=hipuq.relative(cp.Uniform(0, 1), nominal="x"))
