@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hipuq import _chaospy
-from hipuq.errors import InputError, unknown_name
+from hipuq.errors import InputError, check_name, unknown_name
 
 Array = NDArray[np.float64]
 
@@ -253,13 +253,10 @@ def from_family(family: str, parameters: Mapping[str, Any]) -> Distribution:
     InputError
         If a parameter is missing or not a finite number.
     """
-    if family not in FAMILIES:
-        raise unknown_name("distribution", family, FAMILIES)
-    name, required, optional = FAMILIES[family]
+    name, required, optional = FAMILIES[check_name("distribution", family, FAMILIES)]
     allowed = required + optional
     for key, value in parameters.items():
-        if key not in allowed:
-            raise unknown_name(f"parameter of the distribution {family!r}", key, allowed)
+        check_name(f"parameter of the distribution {family!r}", key, allowed)
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
             raise InputError(f"{key} of the distribution {family!r} is {value!r}: it must be a finite number")
     for key in required:

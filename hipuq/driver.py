@@ -8,7 +8,7 @@ from typing import Any
 
 import xarray as xr
 
-from hipuq.errors import InputError, check_name, unknown_name
+from hipuq.errors import InputError, check_name
 from hipuq.evaluation import evaluate
 from hipuq.inputs import Inputs
 from hipuq.methods import METHODS, Method
@@ -53,10 +53,7 @@ def design(
     """
     _check_inputs(inputs)
     record = method_named(method)
-    allowed = record.options("design")
-    for name in options:
-        if name not in allowed:
-            raise unknown_name(f"option of the design of {record.title}", name, allowed)
+    record.check("design", options)
     return record.design(inputs, n, rng, rows=rows, **options)
 
 
@@ -86,10 +83,7 @@ def estimate(
     """
     _check_inputs(inputs)
     record = method_named(method)
-    allowed = record.options("estimate")
-    for name in options:
-        if name not in allowed:
-            raise unknown_name(f"option of the estimate of {record.title}", name, allowed)
+    record.check("estimate", options)
     return record.estimate(outcomes, inputs, of=of, rng=rng, **options)
 
 

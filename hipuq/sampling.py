@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.errors import InputError, unknown_name
+from hipuq.errors import InputError, check_name
 
 Array = NDArray[np.float64]
 Seed = int | np.integer | np.random.Generator | np.random.SeedSequence | None
@@ -85,8 +85,7 @@ def check_size(sampler: str, n: int, replicates: int = 1) -> None:
     InputError
         If n does not suit it.
     """
-    if sampler not in SAMPLERS:
-        raise unknown_name("sampler", sampler, SAMPLERS)
+    check_name("sampler", sampler, SAMPLERS)
     if sampler == "latin_hypercube" and n > LATIN_HYPERCUBE_MAXIMUM:
         raise InputError(
             f"a latin hypercube of {n} points has to be made whole: at most "

@@ -54,3 +54,20 @@ def assert_same_bits(one: Spectra, other: Spectra) -> None:
 def joined(parts: list[Spectra]) -> Spectra:
     """Return the spectra of several batches as one."""
     return Spectra(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Spectra)))
+
+
+SMALL_STUDY = """
+title = "Small"
+seed = 3
+[model]
+name = "ring"
+preset = "oberst2016"
+[inputs.friction]
+distribution = "uniform"
+lower = 0.0
+upper = 0.1
+[inputs.contact]
+distribution = "contact_patterns"
+in_contact = [8, 9]
+"""
+"""Head of a study file: a ring with uncertain friction and contact; analyses are to follow."""

@@ -6,22 +6,13 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
+from helpers import SMALL_STUDY
 
 from hipuq.cli import main
 
-SMALL = """
-title = "Small"
-seed = 3
-[model]
-name = "ring"
-preset = "oberst2016"
-[inputs.friction]
-distribution = "uniform"
-lower = 0.0
-upper = 0.1
-[inputs.contact]
-distribution = "contact_patterns"
-in_contact = [8, 9]
+SMALL = (
+    SMALL_STUDY
+    + """
 [[analysis]]
 name = "small"
 method = "monte_carlo"
@@ -35,6 +26,7 @@ shape_friction = 0.1
 mode_shapes = [18]
 pairs = [[17, 18]]
 """
+)
 
 
 @pytest.fixture(scope="module")

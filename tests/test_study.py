@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from helpers import SMALL_STUDY
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,19 +15,9 @@ from hipuq.errors import HipuqError, StoreError, StudyError
 
 STUDIES = Path(__file__).parents[1] / "studies"
 
-SMALL = """
-title = "Small"
-seed = 3
-[model]
-name = "ring"
-preset = "oberst2016"
-[inputs.friction]
-distribution = "uniform"
-lower = 0.0
-upper = 0.1
-[inputs.contact]
-distribution = "contact_patterns"
-in_contact = [8, 9]
+SMALL = (
+    SMALL_STUDY
+    + """
 [[analysis]]
 name = "a"
 method = "monte_carlo"
@@ -48,6 +39,7 @@ sigma = 0.05
 apply = "relative"
 each = "spring"
 """
+)
 
 
 def write(folder: Path, text: str) -> Path:

@@ -39,8 +39,8 @@ class ExactPencil:
         zero, one = fmpz_mat(n, n, whole[: n * n]), fmpz_mat(n, n, whole[n * n :])
         self.degree = one.rank()
         values = [(zero + t * one).charpoly() for t in range(self.degree + 1)]
-        inverse, self._denominator = _vandermonde_inverse(self.degree)
-        # Row k: coefficients of w**k as a polynomial in mu, times the denominator.
+        inverse = _vandermonde_inverse(self.degree)
+        # Row k: coefficients of w**k as a polynomial in mu, times a common denominator.
         self._rows = [
             [sum((a * p[k] for a, p in zip(line, values, strict=True)), start=fmpz(0)) for line in inverse]
             for k in range(n + 1)
@@ -92,12 +92,11 @@ def integers(values: Array) -> tuple[list[int], int]:
 
 
 @lru_cache
-def _vandermonde_inverse(degree: int) -> tuple[list[list[int]], int]:
-    """Return the inverse of the Vandermonde matrix of 0 to degree, as integers over a denominator."""
+def _vandermonde_inverse(degree: int) -> list[list[int]]:
+    """Return the inverse of the Vandermonde matrix of 0 to degree, times a number that makes it whole."""
     from flint import fmpq_mat
 
     size = degree + 1
     nodes = fmpq_mat(size, size, [t**j for t in range(size) for j in range(size)])
-    inverse = nodes.inv()
-    numerator, denominator = inverse.numer_denom()
-    return [[int(numerator[i, j]) for j in range(size)] for i in range(size)], int(denominator)
+    whole, _ = nodes.inv().numer_denom()
+    return [[int(whole[i, j]) for j in range(size)] for i in range(size)]

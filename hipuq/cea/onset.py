@@ -82,7 +82,7 @@ def boundaries(pencils: Pencils, lower: float, upper: float) -> list[list[Bounda
     Raises
     ------
     InputError
-        If the range does not ascend, is not finite, or a sample is damped.
+        If the range does not ascend, is not finite, a sample is damped, or several pairs merge at once.
     """
     if not (np.isfinite([lower, upper]).all() and 0 <= lower < upper):
         raise InputError(f"the range of friction is {lower} to {upper}: it must ascend from 0 or above")
@@ -110,13 +110,17 @@ def boundaries(pencils: Pencils, lower: float, upper: float) -> list[list[Bounda
                 found.append((i, a, m) if a.count != m.count else (i, m, b))
             elif b.friction - a.friction > NARROWEST:
                 rest += [(i, a, m), (i, m, b)]
-            elif search.exact_count(i, a) != search.exact_count(i, b):
+            else:
                 found.append((i, a, b))
         todo = rest
     result: list[list[Boundary]] = [[] for _ in range(samples)]
     for i, a, b in found:
         # Where several roots nearly meet, the rounding of A0 + mu A1 alone can couple them.
         if search.exact_count(i, a) != search.exact_count(i, b):
+            if abs(a.count - b.count) != 1:
+                raise InputError(
+                    f"several pairs of sample {i} merge at friction {a.friction}: they cannot be told apart"
+                )
             result[i].append(search.solve(i, a, b))
     return [
         search.beyond_rounding(i, sorted(part, key=lambda one: one.friction)) for i, part in enumerate(result)
@@ -161,13 +165,9 @@ class _Search:
             If the mechanisms that were declared are not there.
         """
         m = int(self.mechanisms[i])
-        near = np.concatenate([np.zeros(m), point.real, point.pairs, point.pairs.conj()]).astype(
-            np.complex128
-        )
+        near = np.concatenate([np.zeros(m, np.complex128), point.real, point.pairs, point.pairs.conj()])
         exact = self.exact(i)
-        values = certify_polynomial(
-            exact.at(point.friction), exact.exponent, near.astype(np.complex128), m, self.norm[i]
-        )
+        values = certify_polynomial(exact.at(point.friction), exact.exponent, near, m, self.norm[i])
         if values is None:
             raise InputError(
                 f"sample {i} has fewer mechanisms than the {m} declared, at friction {point.friction}"
@@ -228,12 +228,11 @@ class _Search:
                 x1, f1, f0 = x, f, f0 / 2
             else:
                 x0, f0, x1, f1 = x1, f1, x, f
-        return self._proved(i, exact, x, centre, 1 if b.count > a.count else -1, above)
+        return self._proved(i, x, centre, 1 if b.count > a.count else -1)
 
-    def _proved(
-        self, i: int, exact: ExactPencil, friction: float, centre: float, direction: int, above: Point
-    ) -> Boundary:
+    def _proved(self, i: int, friction: float, centre: float, direction: int) -> Boundary:
         """Return the boundary with whether it is proved, its mode and frequency."""
+        exact = self.exact(i)
         unit = 2.0**exact.exponent
         m = int(self.mechanisms[i])
         counts, mode = [], 0

@@ -18,7 +18,7 @@ from hipuq.cea.bounds import ALWAYS, AUTO, NEVER
 from hipuq.cea.damped import damped_modes
 from hipuq.cea.pencils import Array, Pencils
 from hipuq.cea.undamped import undamped_modes
-from hipuq.errors import InputError, unknown_name
+from hipuq.errors import InputError, check_name
 
 
 @dataclass(frozen=True)
@@ -100,8 +100,7 @@ def solve(pencils: Pencils, *, growth_threshold: float = 0.0, certify: str = AUT
         raise InputError(
             f"growth_threshold is {growth_threshold}: it must be a finite number of 1/s, 0 or above"
         )
-    if certify not in (AUTO, ALWAYS, NEVER):
-        raise unknown_name("way to certify", certify, (AUTO, ALWAYS, NEVER))
+    check_name("way to certify", certify, (AUTO, ALWAYS, NEVER))
     stiffness, damping = pencils.reduced()
     mechanisms = pencils.mechanisms
     s, n = stiffness.shape[:2]

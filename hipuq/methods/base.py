@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from hipuq import schema
-from hipuq.errors import InputError, unknown_name
+from hipuq.errors import InputError, check_name
 from hipuq.inputs import Inputs
 from hipuq.methods.intervals import check_confidence
 from hipuq.sampling import BLOCK
@@ -53,6 +53,17 @@ class Method:
             if parameter.kind is parameter.KEYWORD_ONLY and name not in ("rows", "of", "rng")
         }
 
+    def check(self, stage: str, options: Mapping[str, Any]) -> None:
+        """Check that all options belong to ``"design"`` or ``"estimate"``.
+
+        Raises
+        ------
+        UnknownNameError
+            If one does not.
+        """
+        for name in options:
+            check_name(f"option of the {stage} of {self.title}", name, self.options(stage))
+
     def split(self, options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return the options of design and those of estimate.
 
@@ -65,8 +76,7 @@ class Method:
         """
         design, estimate = self.options("design"), self.options("estimate")
         for name in options:
-            if name not in design and name not in estimate:
-                raise unknown_name(f"option of {self.title}", name, [*design, *estimate])
+            check_name(f"option of {self.title}", name, [*design, *estimate])
         if "confidence" in options:
             check_confidence(options["confidence"])
         return (

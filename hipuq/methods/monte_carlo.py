@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from hipuq import schema
-from hipuq.errors import InputError, unknown_name
+from hipuq.errors import InputError, check_name
 from hipuq.inputs import Inputs
 from hipuq.methods.base import rows_of, samples_by_block
 from hipuq.methods.intervals import check_confidence, student, wilson
@@ -141,8 +141,7 @@ def _plan(
 ) -> tuple[int, int, xr.Dataset | None]:
     """Return samples for each replicate, replicates, and the levels of the strata."""
     n = check_count("n", n)
-    if sampler not in SAMPLERS:
-        raise unknown_name("sampler", sampler, SAMPLERS)
+    check_name("sampler", sampler, SAMPLERS)
     parts = REPLICATES[sampler] if replicates is None else check_count("replicates", replicates)
     if n % parts:
         raise InputError(f"n is {n}: it must be a multiple of the {parts} replicates")
@@ -161,8 +160,7 @@ def _stratum(inputs: Inputs, stratify: str | bool) -> tuple[str, Inputs]:
                 f"stratify is True, but the discrete inputs are {inputs.discrete or 'none'}: name one"
             )
         stratify = inputs.discrete[0]
-    if stratify not in inputs.discrete:
-        raise unknown_name("discrete input to stratify", stratify, inputs.discrete)
+    check_name("discrete input to stratify", stratify, inputs.discrete)
     return stratify, inputs.without(stratify)
 
 
