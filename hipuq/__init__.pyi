@@ -8,6 +8,7 @@ from .driver import run as run
 from .errors import HipuqError as HipuqError
 from .evaluation import evaluate as evaluate
 from .inputs import Inputs as Inputs
+from .models.sensitivity import onset_sensitivity as onset_sensitivity
 from .store import load_outcomes as load_outcomes
 from .store import load_results as load_results
 from .store import save_outcomes as save_outcomes

@@ -123,5 +123,6 @@ def test_registries_agree_with_their_folders():
     assert {path.stem for path in (PACKAGE / "models").glob("*.py")} - {
         "base",
         "parameter",
+        "sensitivity",
         "__init__",
     } == modules

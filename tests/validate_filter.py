@@ -38,7 +38,7 @@ from hipuq.cea import Pencils, solve
 from hipuq.cea.bounds import STRUCTURED, ZERO, norms
 from hipuq.cea.damped import _without_mechanisms
 from hipuq.cea.structured import SAFETY, structured_eigenvalues
-from hipuq.cea.undamped import _judge
+from hipuq.cea.undamped import judge as judge_roots
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def plain_verdicts(pencils: Pencils, threshold: float) -> tuple[np.ndarray, np.n
         norm = norms(matrices)[:, None]
         values = np.linalg.eigvals(matrices).astype(complex)
         radius = np.broadcast_to((pencils.filter_radius or np.inf) * norm, values.shape)
-        rigid, known = _judge(values, radius, ZERO * norm, mechanisms, threshold)
+        rigid, known = judge_roots(values, radius, ZERO * norm, mechanisms, threshold)
         growth = np.where(rigid, 0.0, np.abs(np.sqrt(-values).real)).max(axis=1)
         verdict = growth > threshold
         if threshold == 0:

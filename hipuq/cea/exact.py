@@ -29,44 +29,32 @@ class ExactPencil:
         Degree in w.
     exponent : int
         Roots of the polynomials are w / 2**exponent.
+    bits : int
+        They have about so many bits.
     """
 
     def __init__(self, constant: Array, slope: Array) -> None:
-        from flint import fmpz, fmpz_mat
+        from flint import fmpz_mat
 
         self.n = n = len(constant)
         whole, self.exponent = integers(np.stack([constant, slope]))
         zero, one = fmpz_mat(n, n, whole[: n * n]), fmpz_mat(n, n, whole[n * n :])
+        self.bits = max(abs(a) for a in whole).bit_length()
         self.degree = one.rank()
-        values = [(zero + t * one).charpoly() for t in range(self.degree + 1)]
-        inverse = _vandermonde_inverse(self.degree)
+        values = [(zero + t * one).charpoly().coeffs() for t in range(self.degree + 1)]
+        samples = fmpz_mat(self.degree + 1, n + 1, [c for p in values for c in p])
         # Row k: coefficients of w**k as a polynomial in mu, times a common denominator.
-        self._rows = [
-            [sum((a * p[k] for a, p in zip(line, values, strict=True)), start=fmpz(0)) for line in inverse]
-            for k in range(n + 1)
-        ]
+        self._rows = (_vandermonde_inverse(self.degree) * samples).transpose()
 
     def at(self, mu: float) -> Any:
         """Return an integer multiple of the characteristic polynomial in w / 2**exponent, fmpz_poly."""
-        from flint import fmpz_poly
+        from flint import fmpz, fmpz_mat, fmpz_poly
 
-        mantissa, exponent = np.frexp(mu)
-        whole, power = int(mantissa * 2.0**53), int(exponent) - 53
-        while whole and whole % 2 == 0 and power < 0:
-            whole, power = whole // 2, power + 1
-        up = max(power, 0)
-        whole <<= up
-        down = up - power
-        # sum of c_j mu**j times 2**(down * degree), by Horner's rule.
-        made = []
-        for row in self._rows:
-            total = row[-1]
-            shift = 0
-            for c in reversed(row[:-1]):
-                shift += down
-                total = total * whole + (c << shift)
-            made.append(total)
-        return fmpz_poly(made)
+        top, bottom = mu.as_integer_ratio()
+        down = bottom.bit_length() - 1
+        powers = [fmpz(top) ** j << down * (self.degree - j) for j in range(self.degree + 1)]
+        made = self._rows * fmpz_mat(self.degree + 1, 1, powers)
+        return fmpz_poly([made[k, 0] for k in range(self.n + 1)])
 
 
 def integers(values: Array) -> tuple[list[int], int]:
@@ -92,11 +80,10 @@ def integers(values: Array) -> tuple[list[int], int]:
 
 
 @lru_cache
-def _vandermonde_inverse(degree: int) -> list[list[int]]:
+def _vandermonde_inverse(degree: int) -> Any:
     """Return the inverse of the Vandermonde matrix of 0 to degree, times a number that makes it whole."""
     from flint import fmpq_mat
 
     size = degree + 1
     nodes = fmpq_mat(size, size, [t**j for t in range(size) for j in range(size)])
-    whole, _ = nodes.inv().numer_denom()
-    return [[int(whole[i, j]) for j in range(size)] for i in range(size)]
+    return nodes.inv().numer_denom()[0]

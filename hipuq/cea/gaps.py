@@ -1,121 +1,246 @@
-"""Squared gaps between eigenvalues at neighbouring frictions: which can vanish, and which has."""
+"""Squared gaps between eigenvalues at neighbouring frictions: which can vanish, and which has.
+
+Intervals of friction come as three `Points`: their lower ends, middles and upper ends.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hipuq.cea.bounds import Complex
 from hipuq.cea.pencils import Array
+from hipuq.cea.points import Points
+
+Mask = NDArray[np.bool_]
+Triple = tuple[Points, Points, Points]
+
+NARROWEST = 3e-8
+"""Windows of instability narrower than this in friction are not looked for."""
+
+PARABOLIC = 16 * NARROWEST
+"""Width of an interval up to which the parabola through three squared gaps tells how wide a window is."""
+
+STRAIGHT = 0.25
+"""Second difference of a squared gap, over its first, below which it passes through zero only once."""
 
 
 @dataclass(frozen=True)
-class Point:
-    """Eigenvalues at one friction, mechanisms left out: real ones ascending, upper ones of pairs."""
+class Bracket:
+    """An interval of friction in which something passes through zero once.
 
-    friction: float
-    real: Array
-    pairs: Complex
+    Attributes
+    ----------
+    row : int
+        Sample.
+    friction : (2,) array
+        Ends of the interval [1].
+    change : (2,) array of int
+        Change of the number of coalesced pairs and of the number of negative roots, from the lower
+        end to the upper one.
+    values : (2,) array
+        The squared gap [1/s^4], or the root w itself [1/s^2], at the ends; NaN where not known.
+    centre : float
+        Root w about which it happens [1/s^2].
+    """
 
-    @property
-    def count(self) -> int:
-        """Number of coalesced pairs."""
-        return len(self.pairs)
-
-    def without(self, k: int | None, pair: int | None) -> Point:
-        """Return the point without the real roots k and k + 1, or without a pair."""
-        real = self.real if k is None else np.delete(self.real, [k, k + 1])
-        pairs = self.pairs if pair is None else np.delete(self.pairs, pair)
-        return Point(self.friction, real, pairs)
+    row: int
+    friction: Array
+    change: tuple[int, int]
+    values: Array
+    centre: float
 
 
-def apart(a: Point, m: Point, b: Point, scale: float) -> bool:
-    """Say whether no squared gap can reach zero between two frictions, judged by three points.
+def vanishing(points: Triple) -> tuple[Mask, Array]:
+    """Say which intervals may hold a zero of a squared gap, though no count differs at their points.
+
+    A gap that stays larger than its second difference, or whose square does, cannot vanish: the
+    gap is smooth where two real roots cross without coupling, its square where they merge.
 
     Parameters
     ----------
-    a, m, b : Point
-        The ends and the middle, with the same number of pairs.
-    scale : float
-        Size of the eigenvalues [1/s^2].
+    points : three Points
+        With the same numbers of pairs and of negative roots in each interval.
 
     Returns
     -------
-    bool
-        True if each gap stays larger than its second difference.
+    open : (N,) array of bool
+    vertex : (N,) array
+        Friction at which the least squared gap has its minimum, by the parabola through its three
+        values; NaN where that is not inside the interval.
     """
-    real = np.array([np.diff(point.real) for point in (a, m, b)]) ** 2
-    pairs = np.array([_matched(point, m) for point in (a, m, b)])
-    lowest = np.array([[point.real[0] * scale] for point in (a, m, b)]) if m.real.size else np.zeros((3, 0))
-    tracked = np.concatenate([real, 4 * pairs.imag**2, lowest], axis=1)
-    bend = np.abs(tracked[0] - 2 * tracked[1] + tracked[2])
-    return bool((tracked.min(axis=0) > bend).all())
+    a, m, b = points
+    width = (b.friction - a.friction)[:, None]
+    gap = np.stack([np.diff(point.real, axis=1) for point in points])
+    squared = np.square(gap)
+    paired = np.stack([_matched(point.pairs, m.pairs) for point in points])
+    roots = np.abs(np.stack([point.real for point in points]))
+    sure = [_stays(np.square(paired.imag)), _stays(roots)]
+    # Parabola of the squared gap over -1, 0, 1: c t^2 + s t + e, lowest at t = -s / 2c.
+    c = (squared[0] - 2 * squared[1] + squared[2]) / 2
+    s = (squared[2] - squared[0]) / 2
+    bowl = (c > 0) & (np.abs(s) < 2 * c)
+    t = np.divide(-s, 2 * c, out=np.zeros_like(s), where=bowl)
+    depth = np.square(t) - np.divide(squared[1], c, out=np.zeros_like(s), where=bowl)
+    window = np.sqrt(np.maximum(depth, 0.0)) * width
+    clear = _stays(gap) | _stays(squared) | ((width <= PARABOLIC) & bowl & (window < NARROWEST))
+    low = np.where(~clear & bowl, squared[1] - c * np.square(t), np.inf)
+    k = np.argmin(low, axis=1)
+    rows = np.arange(len(k))
+    vertex = np.where(np.isfinite(low[rows, k]), m.friction + t[rows, k] * width[:, 0] / 2, np.nan)
+    return ~(clear.all(axis=1) & np.all(np.concatenate(sure, axis=1), axis=1)), vertex
 
 
-def _matched(point: Point, reference: Point) -> Complex:
-    """Return the pairs of a point in the order of those of the reference, each the nearest one left."""
-    left = list(point.pairs)
-    return np.array(
-        [left.pop(int(np.argmin([abs(z - other) for other in left]))) for z in reference.pairs],
-        np.complex128,
+def _stays(values: Array) -> Mask:
+    """Say whether positive values at three points stay larger than their second difference; NaN do."""
+    bend = np.abs(values[0] - 2 * values[1] + values[2])
+    return np.asarray((values.min(axis=0) > bend) | np.isnan(bend))
+
+
+def _matched(pairs: Complex, reference: Complex) -> Complex:
+    """Return pairs in the order of those of the reference, each the nearest one left; (N, p)."""
+    with np.errstate(invalid="ignore"):
+        distance = np.abs(reference[:, :, None] - pairs[:, None, :])
+    distance[np.isnan(distance)] = np.inf
+    index = np.empty(pairs.shape, np.intp)
+    rows = np.arange(len(pairs))
+    for j in range(pairs.shape[1]):
+        # The pairs come first, as many as the reference has; what is left is NaN and stays in place.
+        index[:, j] = np.where(np.isnan(reference[:, j]), j, distance[:, j].argmin(axis=1))
+        distance[rows, :, index[:, j]] = np.inf
+    return np.take_along_axis(pairs, index, axis=1)
+
+
+def crossing(points: Triple) -> tuple[list[Bracket | None], Array]:
+    """Return the bracket of each interval in which exactly one thing passes through zero, once.
+
+    Parameters
+    ----------
+    points : three Points
+        With different numbers of pairs or of negative roots in each interval.
+
+    Returns
+    -------
+    brackets : list of Bracket or None
+        None where more than one thing may pass through zero, it may do so more than once, or the pair
+        that merges is not yet far from the other roots against its own gap.
+    zero : (N,) array
+        Estimate of the friction at which it happens, NaN where there is none.
+    """
+    pairs = np.stack([point.coalesced for point in points])
+    negative = np.stack([point.negative for point in points])
+    rest = [replace(point, real=point.real.copy(), pairs=point.pairs.copy()) for point in points]
+    values = np.full(pairs.shape, np.nan)
+    centre = np.full(pairs.shape, np.nan)
+    for counts, other, follow in ((pairs, negative, _merged), (negative, pairs, _negated)):
+        fit = (np.abs(counts[2] - counts[0]) == 1) & (other == other[0]).all(axis=0)
+        fit &= (counts[1] == counts[0]) | (counts[1] == counts[2])
+        for i in np.flatnonzero(fit):
+            values[:, i], centre[:, i] = follow(points, rest, counts[:, i], int(i))
+    bend = np.abs(values[0] - 2 * values[1] + values[2])
+    with np.errstate(invalid="ignore"):
+        single = bend <= STRAIGHT * np.abs(values[2] - values[0])
+    open_, _ = vanishing((rest[0], rest[1], rest[2]))
+    single &= ~open_
+    zero = np.full(len(single), np.nan)
+    found: list[Bracket | None] = [None] * len(single)
+    for i in np.flatnonzero(single):
+        zero[i] = _secant(points, values[:, i], i)
+        if pairs[0, i] != pairs[2, i] and not _isolated(rest, values[:, i], centre[:, i], i):
+            continue
+        first = 0 if values[0, i] * values[1, i] < 0 else 1
+        ends = [first, first + 1]
+        found[i] = Bracket(
+            int(points[0].row[i]),
+            np.array([points[j].friction[i] for j in ends]),
+            (int(pairs[2, i] - pairs[0, i]), int(negative[2, i] - negative[0, i])),
+            values[ends, i],
+            float(centre[ends, i][np.argmin(values[ends, i])]),
+        )
+    return found, zero
+
+
+def _secant(points: Triple, values: Array, i: int) -> float:
+    """Return where the line through the two values of different sign is zero."""
+    first = 0 if values[0] * values[1] < 0 else 1
+    x0, x1 = (float(points[j].friction[i]) for j in (first, first + 1))
+    f0, f1 = values[first : first + 2]
+    return float((x0 * f1 - x1 * f0) / (f1 - f0))
+
+
+def _isolated(rest: list[Points], values: Array, centre: Array, i: int) -> bool:
+    """Say whether the pair that merges stays far from all other roots against its gap and its way."""
+    own = np.sqrt(np.abs(values)).max() / 2 + np.ptp(centre)
+    others = np.concatenate(
+        [np.append(point.real[i], point.pairs[i]) - x for point, x in zip(rest, centre, strict=True)]
     )
+    return bool(np.nanmin(np.abs(others), initial=np.inf) > 3 * own)
 
 
-def single(a: Point, m: Point, b: Point, scale: float) -> bool:
-    """Say whether exactly one squared gap passes through zero between a and b, and none other can.
-
-    Parameters
-    ----------
-    a, m, b : Point
-        The ends and the middle.
-    scale : float
-        Size of the eigenvalues [1/s^2].
-
-    Returns
-    -------
-    bool
-    """
-    if abs(a.count - b.count) != 1 or m.count not in (a.count, b.count):
-        return False
-    fewer = min(a.count, b.count)
-    below = [point for point in (a, m, b) if point.count == fewer]
-    above = [point for point in (a, m, b) if point.count != fewer]
-    signed, reduced = {}, {}
-    for point in below:
-        k, _ = merging(point, above[0])
-        signed[point.friction] = (point.real[k + 1] - point.real[k]) ** 2
-        reduced[point.friction] = point.without(k, None)
-    for point in above:
-        _, pair = merging(below[0], point)
-        signed[point.friction] = -4 * point.pairs[pair].imag ** 2
-        reduced[point.friction] = point.without(None, pair)
-    s = [signed[point.friction] for point in (a, m, b)]
-    straight = abs(s[0] - 2 * s[1] + s[2]) <= 0.25 * abs(s[2] - s[0])
-    first, second, third = (reduced[point.friction] for point in (a, m, b))
-    return bool(straight) and apart(first, second, third, scale)
+def _merged(points: Triple, rest: list[Points], counts: NDArray[np.intp], i: int) -> tuple[Array, Array]:
+    """Return the squared gap and centre of the pair that merges, and take it out of the rest."""
+    values, centre = np.empty(3), np.empty(3)
+    few = counts.min()
+    below, above = (next(j for j in range(3) if (counts[j] == few) == low) for low in (True, False))
+    for j, point in enumerate(points):
+        one, two = (points[j if counts[j] == few else below], points[j if counts[j] != few else above])
+        k, pair = merging(one.real[i], one.pairs[i], two.real[i], two.pairs[i])
+        if counts[j] == few:
+            x, y = point.real[i, k : k + 2]
+            values[j], centre[j] = (y - x) ** 2, (x + y) / 2
+            rest[j].real[i] = np.append(np.delete(point.real[i], [k, k + 1]), [np.nan, np.nan])
+        else:
+            z = point.pairs[i, pair]
+            values[j], centre[j] = -4 * z.imag**2, z.real
+            rest[j].pairs[i] = np.append(np.delete(point.pairs[i], pair), complex(np.nan, np.nan))
+    return values, centre
 
 
-def merging(below: Point, above: Point) -> tuple[int, int]:
-    """Return which real roots k, k + 1 of the one point make which pair of the other.
+def _negated(points: Triple, rest: list[Points], counts: NDArray[np.intp], i: int) -> tuple[Array, Array]:
+    """Return the real root that passes through zero, and take it out of the rest."""
+    k = int(counts.min())
+    values = np.array([point.real[i, k] for point in points])
+    for part, point in zip(rest, points, strict=True):
+        part.real[i] = np.append(np.delete(point.real[i], k), np.nan)
+    return values, values
+
+
+def merging(x: Array, fewer: Complex, y: Array, more: Complex) -> tuple[int, int]:
+    """Return which real roots k, k + 1 of one point make which pair of another.
 
     Those that leave the remaining roots nearest to each other.
 
     Parameters
     ----------
-    below, above : Point
-        The second has one pair more.
+    x, y : (n,) array
+        Real roots, ascending, then NaN; the second point has two fewer.
+    fewer, more : (p,) complex array
+        Pairs, then NaN; the second point has one more.
 
     Returns
     -------
     k, pair : int
     """
-    left = list(range(above.count))
-    for z in below.pairs:
-        left.remove(min(left, key=lambda j: abs(above.pairs[j] - z)))
-    pair = left[0]
-    x, y = below.real, above.real
+    x, y = x[~np.isnan(x)], y[~np.isnan(y)]
+    left = list(np.flatnonzero(~np.isnan(more)))
+    for z in fewer[~np.isnan(fewer)]:
+        left.remove(min(left, key=lambda j: abs(more[j] - z)))
+    pair = int(left[0])
     low = np.concatenate([[0.0], np.cumsum((x[: len(y)] - y) ** 2)])
     high = np.concatenate([np.cumsum(((x[2:] - y) ** 2)[::-1])[::-1], [0.0]])
     centre = (x[:-1] + x[1:]) / 2
-    return int(np.argmin(low + high + (centre - above.pairs[pair].real) ** 2)), pair
+    return int(np.argmin(low + high + (centre - more[pair].real) ** 2)), pair
+
+
+def unresolved(points: Triple, i: int) -> Bracket:
+    """Return an interval too narrow to divide whose ends differ, as it is."""
+    a, _, b = points
+    change = (int(b.coalesced[i] - a.coalesced[i]), int(b.negative[i] - a.negative[i]))
+    more = b if change[0] > 0 else a
+    pairs = more.pairs[i, ~np.isnan(more.pairs[i])]
+    # The pair nearest to the real axis is the one that has just coalesced.
+    centre = float(pairs[np.argmin(np.abs(pairs.imag))].real) if change[0] else 0.0
+    friction = np.array([a.friction[i], b.friction[i]])
+    return Bracket(int(points[0].row[i]), friction, change, np.full(2, np.nan), centre)

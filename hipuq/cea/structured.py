@@ -15,8 +15,16 @@ from numpy.typing import NDArray
 from hipuq.cea.bounds import EPS, Complex
 from hipuq.cea.pencils import Array
 
+Rows = NDArray[np.intp]
+
 MAXIMUM_STEPS = 60
 """Steps after which a root that still moves is taken as not found."""
+
+ROUGH_STEPS = 20
+"""Steps after which a rough solution is left as it is."""
+
+ROUGH = 200
+"""Correction, in units of the rounding of the largest root, with which a rough solution is content."""
 
 SAFETY = 100.0
 """Factor on the first-order bound eps * structured condition number, for the rounding in n block
@@ -48,7 +56,13 @@ def block_sizes(matrices: Array) -> NDArray[np.intp]:
     return sizes
 
 
-def structured_eigenvalues(matrices: Array, start: Complex, b: int) -> tuple[Complex, Array]:
+def structured_eigenvalues(
+    matrices: Array,
+    start: Complex,
+    b: int,
+    fixed: NDArray[np.bool_] | None = None,
+    rough: bool = False,
+) -> tuple[Complex, Array]:
     """Return the eigenvalues of block tridiagonal matrices and their error bounds.
 
     Parameters
@@ -58,6 +72,12 @@ def structured_eigenvalues(matrices: Array, start: Complex, b: int) -> tuple[Com
         Approximations, such as LAPACK's.
     b : int
         Block size.
+    fixed : (s, n) array of bool, optional
+        Approximations that are roots as they are and not to be moved, such as those of mechanisms: to
+        a multiple zero the iteration converges slowly. Their bound is 0.
+    rough : bool
+        Be content with roots that still move after ROUGH_STEPS, as they do by about their accuracy
+        where several nearly meet. Their bound, from the last step, is an estimate.
 
     Returns
     -------
@@ -69,33 +89,43 @@ def structured_eigenvalues(matrices: Array, start: Complex, b: int) -> tuple[Com
         and n / 2 times the last correction, because towards an n-fold root the iteration converges
         linearly. Infinite where it did not converge.
     """
-    blocks = _Blocks(matrices, b)
     n = matrices.shape[1]
     scale = np.abs(start).max(axis=1, keepdims=True)
     scale[scale == 0] = 1.0
     # Conjugate approximations would stay conjugate though the roots are real: set them off unevenly.
     golden = np.exp(2j * np.pi * 0.381966 * np.arange(1, n + 1))
-    values = start + 1e-9 * scale * golden
-    step = np.full(values.shape, np.inf)
-    moving = np.ones(values.shape, bool)
+    moving = np.ones(start.shape, bool) if fixed is None else ~fixed
+    values = start + np.where(moving, 1e-9 * scale * golden, 0.0)
+    step = np.where(moving, np.inf, 0.0)
+    blocks = _Blocks(matrices, b)
+    row, root = np.nonzero(moving)
+    own = blocks.rows(row)
     with np.errstate(all="ignore"):
-        for _ in range(MAXIMUM_STEPS):
-            rows = np.flatnonzero(moving.any(axis=1))
-            if not rows.size:
+        for _ in range(ROUGH_STEPS if rough else MAXIMUM_STEPS):
+            still = moving[row, root]
+            if not still.any():
                 break
-            delta = _correction(blocks.rows(rows), values[rows])
-            delta[~(np.isfinite(delta) & moving[rows])] = 0.0
+            if still.mean() < 0.7:
+                row, root = row[still], root[still]
+                own = blocks.rows(row)
+            delta = _correction(own, values, row, root)
+            delta[~(np.isfinite(delta) & moving[row, root])] = 0.0
             size = np.abs(delta)
-            values[rows] -= delta
+            values[row, root] -= delta
             # Corrections of rounding size no longer shrink: the attainable accuracy is reached.
-            settled = (size <= 4 * EPS * scale[rows]) | (
-                (size <= 64 * EPS * scale[rows]) & (size >= 0.5 * step[rows])
+            fine = EPS * scale[row, 0]
+            settled = (size <= (ROUGH if rough else 4) * fine) | (
+                (size <= 128 * fine) & (size >= 0.5 * step[row, root])
             )
-            step[rows] = np.where(moving[rows], size, step[rows])
-            moving[rows] &= ~settled
-        radius = SAFETY * EPS * np.maximum(_structured_condition(blocks, values), scale)
+            step[row, root] = np.where(moving[row, root], size, step[row, root])
+            moving[row, root] &= ~settled
+        row, root = np.nonzero(np.ones_like(moving))
+        condition = _structured_condition(blocks.rows(row), values, row, root).reshape(values.shape)
+        radius = SAFETY * EPS * np.maximum(condition, scale)
         radius += 0.5 * n * step
-    radius[~np.isfinite(radius) | moving] = np.inf
+    if fixed is not None:
+        radius[fixed] = 0.0
+    radius[~np.isfinite(radius) | (moving & (not rough))] = np.inf
     # Two approximations of one root would leave another root out, and the trace wrong.
     stray = np.abs(values.sum(axis=1) - np.trace(matrices, axis1=1, axis2=2))
     radius[stray > radius.sum(axis=1)] = np.inf
@@ -103,92 +133,105 @@ def structured_eigenvalues(matrices: Array, start: Complex, b: int) -> tuple[Com
 
 
 class _Blocks:
-    """Block diagonals of a batch, (s, 1, b, b) each, so that they go with (s, roots, b, b)."""
+    """Block diagonals of a batch, (count, b, b, s) each: long loops over the samples are fast."""
 
     def __init__(self, matrices: Array, b: int) -> None:
         s, n, _ = matrices.shape
         self.count = n // b
-        tiles = matrices.reshape(s, self.count, b, self.count, b).transpose(1, 3, 0, 2, 4)
+        tiles = matrices.reshape(s, self.count, b, self.count, b).transpose(1, 3, 2, 4, 0)
         index = np.arange(self.count)
-        self.diagonal = tiles[index, index][:, :, None]
-        self.lower = tiles[index[1:], index[:-1]][:, :, None]
-        self.upper = tiles[index[:-1], index[1:]][:, :, None]
+        self.diagonal = tiles[index, index].astype(np.complex128)
+        self.lower = tiles[index[1:], index[:-1]].astype(np.complex128)
+        self.upper = tiles[index[:-1], index[1:]].astype(np.complex128)
 
     def rows(self, rows: NDArray[np.intp]) -> _Blocks:
-        """Return the blocks of some samples."""
+        """Return the blocks of some samples, repeated as they are."""
         part = object.__new__(_Blocks)
         part.count = self.count
         part.diagonal, part.lower, part.upper = (
-            blocks[:, rows] for blocks in (self.diagonal, self.lower, self.upper)
+            blocks.take(rows, axis=-1) for blocks in (self.diagonal, self.lower, self.upper)
         )
         return part
 
 
 def _times(left: Complex, right: Complex) -> Complex:
-    """Return the products of small matrices; matmul would cost a call for each."""
-    product = left[..., :, :1] * right[..., :1, :]
-    for k in range(1, left.shape[-1]):
-        product = product + left[..., :, k : k + 1] * right[..., k : k + 1, :]
-    return np.asarray(product, dtype=np.complex128)
+    """Return the products of small matrices, (b, b, N); matmul would cost a call for each."""
+    product = left[:, :1] * right[:1]
+    for k in range(1, left.shape[0]):
+        product += left[:, k : k + 1] * right[k : k + 1]
+    return product
+
+
+def _trace_of_product(left: Complex, right: Complex) -> Complex:
+    """Return the traces of products of small matrices, (N,)."""
+    return np.asarray((left * right.swapaxes(0, 1)).sum(axis=(0, 1)), dtype=np.complex128)
 
 
 def _inverse(matrices: Complex) -> Complex:
-    """Return the inverses of small matrices, not finite for singular ones."""
-    b = matrices.shape[-1]
+    """Return the inverses of small matrices, (b, b, N), not finite for singular ones."""
+    b = len(matrices)
     if b == 1:
         return np.asarray(1.0 / matrices, dtype=np.complex128)
     if b == 2:
-        (p, q), (r, t) = np.moveaxis(matrices, (-2, -1), (0, 1))
-        adjoint = np.stack([np.stack([t, -q], -1), np.stack([-r, p], -1)], -2)
-        return np.asarray(adjoint / (p * t - q * r)[..., None, None], dtype=np.complex128)
+        (p, q), (r, t) = matrices
+        inverse = np.empty_like(matrices)
+        one = 1.0 / (p * t - q * r)
+        inverse[0, 0], inverse[0, 1], inverse[1, 0], inverse[1, 1] = t * one, -q * one, -r * one, p * one
+        return inverse
+    stack = matrices.transpose(2, 0, 1)
     try:
-        return np.asarray(np.linalg.inv(matrices), dtype=np.complex128)
+        made = np.linalg.inv(stack)
     except np.linalg.LinAlgError:
-        singular = (np.linalg.slogdet(matrices)[0] == 0)[..., None, None]
-        inverse = np.linalg.inv(np.where(singular, np.eye(b), matrices))
-        return np.where(singular, np.inf, inverse).astype(np.complex128)
+        singular = (np.linalg.slogdet(stack)[0] == 0)[:, None, None]
+        made = np.where(singular, np.inf, np.linalg.inv(np.where(singular, np.eye(b), stack)))
+    return np.ascontiguousarray(made.transpose(1, 2, 0), dtype=np.complex128)
 
 
-def _shifted(blocks: _Blocks, values: Complex) -> list[Complex]:
-    """Return D_i - w for every block and root."""
-    eye = np.eye(blocks.diagonal.shape[-1])
-    return [diagonal - values[:, :, None, None] * eye for diagonal in blocks.diagonal]
+def _shifted(blocks: _Blocks, values: Complex) -> Complex:
+    """Return D_i - w for every block, (count, b, b, N)."""
+    shifted = blocks.diagonal.copy()
+    index = np.arange(shifted.shape[1])
+    shifted[:, index, index] -= values
+    return shifted
 
 
-def _correction(blocks: _Blocks, values: Complex) -> Complex:
-    """Return the Ehrlich-Aberth correction of every root, (s, roots).
+def _correction(blocks: _Blocks, values: Complex, row: Rows, root: Rows) -> Complex:
+    """Return the Ehrlich-Aberth corrections of some roots of values, (N,).
 
     The logarithmic derivative of det(A - w) is the sum of tr(S_i^-1 S_i') over the pivots of the
     block LU, S_i = D_i - w - L S_(i-1)^-1 U.
     """
-    shifted = _shifted(blocks, values)
-    eye = np.eye(blocks.diagonal.shape[-1])
-    derivative: Complex = np.broadcast_to(-eye, shifted[0].shape).astype(np.complex128)
+    own = values[row, root]
+    shifted = _shifted(blocks, own)
+    b = shifted.shape[1]
+    index = np.arange(b)
+    derivative = np.zeros_like(shifted[0])
+    derivative[index, index] = -1.0
     inverse = _inverse(shifted[0])
-    ratio = np.trace(_times(inverse, derivative), axis1=-2, axis2=-1)
+    ratio = _trace_of_product(inverse, derivative)
     for i in range(1, blocks.count):
         left = _times(blocks.lower[i - 1], inverse)
         right = _times(inverse, blocks.upper[i - 1])
-        derivative = -eye + _times(_times(left, derivative), right)
+        derivative = _times(_times(left, derivative), right)
+        derivative[index, index] -= 1.0
         inverse = _inverse(shifted[i] - _times(left, blocks.upper[i - 1]))
-        ratio = ratio + np.trace(_times(inverse, derivative), axis1=-2, axis2=-1)
-    gaps = values[:, :, None] - values[:, None, :]
-    diagonal = np.arange(values.shape[1])
-    gaps[:, diagonal, diagonal] = np.inf
-    return np.asarray(1.0 / (ratio - (1.0 / gaps).sum(axis=2)), dtype=np.complex128)
+        ratio += _trace_of_product(inverse, derivative)
+    gaps = own[:, None] - values[row]
+    gaps[np.arange(len(row)), root] = np.inf
+    return np.asarray(1.0 / (ratio - (1.0 / gaps).sum(axis=1)), dtype=np.complex128)
 
 
-def _structured_condition(blocks: _Blocks, values: Complex) -> Array:
-    """Return how far each root moves if every entry moves by its own size, (s, roots).
+def _structured_condition(blocks: _Blocks, values: Complex, row: Rows, root: Rows) -> Array:
+    """Return how far each root moves if every entry moves by its own size, (N,).
 
     Near a simple root the resolvent is x y^H / (y^H x) over the distance, so the sum of |G_jk||A_kj|
     over the entries of the block tridiagonal, over |tr G|, is the componentwise condition number. G is
     evaluated close to the root, at a small part of the distance to the next one.
     """
-    gaps = np.abs(values[:, :, None] - values[:, None, :])
-    diagonal = np.arange(values.shape[1])
-    gaps[:, diagonal, diagonal] = np.inf
-    shifted = _shifted(blocks, values + 1e-4j * gaps.min(axis=2))
+    own = values[row, root]
+    gaps = np.abs(own[:, None] - values[row])
+    gaps[np.arange(len(row)), root] = np.inf
+    shifted = _shifted(blocks, own + 1e-4j * gaps.min(axis=1))
     below = [_inverse(shifted[0])]
     for i in range(1, blocks.count):
         below.append(
@@ -198,12 +241,12 @@ def _structured_condition(blocks: _Blocks, values: Complex) -> Array:
     for i in range(blocks.count - 2, -1, -1):
         above.append(_inverse(shifted[i] - _times(_times(blocks.upper[i], above[-1]), blocks.lower[i])))
     above.reverse()
-    size = np.zeros(values.shape)
-    trace = np.zeros(values.shape, np.complex128)
-    own = np.abs(values)[:, :, None, None] * np.eye(blocks.diagonal.shape[-1])
+    size = np.zeros(own.shape)
+    trace = np.zeros(own.shape, np.complex128)
+    index = np.arange(shifted.shape[1])
 
     def add(resolvent: Complex, entries: Array) -> None:
-        size[...] += (np.abs(resolvent) * np.abs(entries).swapaxes(-2, -1)).sum(axis=(-2, -1))
+        size[...] += (np.abs(resolvent) * entries.swapaxes(0, 1)).sum(axis=(0, 1))
 
     for i in range(blocks.count):
         pivot = shifted[i]
@@ -212,12 +255,14 @@ def _structured_condition(blocks: _Blocks, values: Complex) -> Array:
         if i < blocks.count - 1:
             pivot = pivot - _times(_times(blocks.upper[i], above[i + 1]), blocks.lower[i])
         centre = _inverse(pivot)
-        trace += np.trace(centre, axis1=-2, axis2=-1)
-        add(centre, np.abs(blocks.diagonal[i]) + own)
+        trace += centre[index, index].sum(axis=0)
+        entries = np.abs(blocks.diagonal[i])
+        entries[index, index] += np.abs(own)
+        add(centre, entries)
         if i < blocks.count - 1:
-            add(_times(_times(above[i + 1], blocks.lower[i]), centre), blocks.upper[i])
+            add(_times(_times(above[i + 1], blocks.lower[i]), centre), np.abs(blocks.upper[i]))
         if i > 0:
-            add(_times(_times(below[i - 1], blocks.upper[i - 1]), centre), blocks.lower[i - 1])
+            add(_times(_times(below[i - 1], blocks.upper[i - 1]), centre), np.abs(blocks.lower[i - 1]))
     return np.asarray(size / np.abs(trace), dtype=np.float64)
 
 

@@ -119,7 +119,7 @@ def judged_roots(
     values: Complex = np.linalg.eigvals(stiffness).astype(np.complex128)
     norm = norms(stiffness)[:, None]
     uniform = np.broadcast_to((filter_radius or np.inf) * norm, values.shape)
-    rigid, known = _judge(values, uniform, ZERO * norm, mechanisms, threshold)
+    rigid, known = judge(values, uniform, ZERO * norm, mechanisms, threshold)
     roots = Roots(values, rigid, known, np.full(len(values), DOUBLE, np.int8))
     if certify == ALWAYS:
         _certify(roots, np.arange(len(values)), stiffness, mechanisms, threshold)
@@ -134,7 +134,7 @@ def judged_roots(
             values[symmetric] = np.linalg.eigvalsh(part[symmetric])
             radius[symmetric] = SAFETY * EPS * norm[rows[symmetric]]
         zero = np.maximum(ZERO * norm[rows], radius)
-        judged = _judge(values, radius, zero, mechanisms[rows], threshold, symmetric[:, None])
+        judged = judge(values, radius, zero, mechanisms[rows], threshold, symmetric[:, None])
         # From here on these eigenvalues stand, known or not: they go with their bounds.
         roots.known[rows] = False
         roots.take(rows, values, judged, DOUBLE)
@@ -146,7 +146,7 @@ def judged_roots(
             values, radius = structured_eigenvalues(stiffness[same], roots.values[same], int(size))
             values, radius = conjugate_pairs(values, radius)
             zero = np.maximum(ZERO * norm[same], radius)
-            judged = _judge(values, radius, zero, mechanisms[same], threshold)
+            judged = judge(values, radius, zero, mechanisms[same], threshold)
             roots.take(same, values, judged, STRUCTURED)
         _certify(roots, roots.open(), stiffness, mechanisms, threshold)
     return roots
@@ -175,7 +175,7 @@ def _certify(
         roots.decided_by[row] = CERTIFICATE
 
 
-def _judge(
+def judge(
     values: Complex,
     radius: Array,
     zero: Array,

@@ -11,6 +11,7 @@ from hipuq.models.base import CEAModel
 from hipuq.models.mode_coupling import two_dof
 from hipuq.models.oscillator_ring import ring
 from hipuq.models.parameter import Parameter
+from hipuq.models.sensitivity import onset_sensitivity
 
 MODELS: dict[str, Callable[..., CEAModel]] = {
     "ring": ring,
@@ -24,4 +25,4 @@ PRESETS: dict[str, list[str]] = {
 }
 """Name of a model -> its presets."""
 
-__all__ = ["MODELS", "PRESETS", "CEAModel", "Parameter", "ring", "two_dof"]
+__all__ = ["MODELS", "PRESETS", "CEAModel", "Parameter", "onset_sensitivity", "ring", "two_dof"]

@@ -178,14 +178,33 @@ class CEAModel(ABC):
         InputError
             If a value is not allowed.
         """
+        return self.assemble(self.values(samples))
+
+    def values(self, samples: xr.Dataset) -> dict[str, Array]:
+        """Return the checked values of every parameter, nominal ones where the samples have none.
+
+        Parameters
+        ----------
+        samples : Dataset
+            Parameters over ``sample``.
+
+        Returns
+        -------
+        dict of str to array
+            (s,) or (s, size), in the units of the schema.
+
+        Raises
+        ------
+        UnknownNameError, SchemaError, InputError
+            As `pencils`.
+        """
         size = schema.check_samples(samples, self.parameters)
-        values = {
+        return {
             name: self._values(name, samples)
             if name in samples
             else np.broadcast_to(parameter.nominal, (size, *parameter.nominal.shape))
             for name, parameter in self.parameters.items()
         }
-        return self.assemble(values)
 
     def check(self, samples: xr.Dataset) -> None:
         """Check all samples at once, so that an error names the sample by its place in the whole.

@@ -78,15 +78,15 @@ class OscillatorRing(CEAModel):
         """Number of degrees of freedom 2 N."""
         return 2 * self.oscillators
 
-    def pencils(self, samples: xr.Dataset) -> Pencils:
-        """Return the matrices of the samples, see `CEAModel.pencils`.
+    def values(self, samples: xr.Dataset) -> dict[str, Array]:
+        """Return the values of every parameter, see `CEAModel.values`.
 
         ``friction_angle`` follows ``contact_angle`` + 90 deg unless the samples hold it.
         """
+        values = super().values(samples)
         if "contact_angle" in samples and "friction_angle" not in samples and self.friction_follows:
-            angle = (samples["contact_angle"] + 90.0).assign_attrs(schema.PARAMETERS["friction_angle"].attrs)
-            samples = samples.assign(friction_angle=angle)
-        return super().pencils(samples)
+            values["friction_angle"] = values["contact_angle"] + 90.0
+        return values
 
     friction_follows: bool = True
     """Whether the friction direction stays perpendicular to the contact direction."""

@@ -1,0 +1,252 @@
+"""A boundary of instability, solved for and proved with the exact characteristic polynomial."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from hipuq.cea.bounds import Complex
+from hipuq.cea.certificate import certify_polynomial
+from hipuq.cea.exact import ExactPencil
+from hipuq.cea.gaps import Bracket
+from hipuq.cea.pencils import Array
+from hipuq.cea.points import Rows, Sweep, structured_values
+from hipuq.cea.structured import structured_eigenvalues
+from hipuq.errors import InputError
+
+SIDE = 1e-12
+"""Relative distance from a boundary at which the verdicts on both its sides are certified."""
+
+CLOSE = 1e-6
+"""Boundaries nearer to each other than this are looked at together, see `_beyond_rounding`."""
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """A friction at which modes become unstable or stable again.
+
+    Attributes
+    ----------
+    friction : float
+        mu [1].
+    direction : int
+        How many more modes are unstable above it, negative if fewer; 1 or -1 unless several change
+        within less than can be resolved.
+    mode : int
+        Number of the growing mode, by frequency, on the unstable side.
+    frequency : float
+        Frequency there [Hz]: common to the pair, 0 for divergence.
+    certified : bool
+        Whether the verdicts at (1 - SIDE) and (1 + SIDE) times the friction are proved.
+    """
+
+    friction: float
+    direction: int
+    mode: int
+    frequency: float
+    certified: bool
+
+
+def proved(sweep: Sweep, brackets: list[Bracket]) -> list[list[Boundary]]:
+    """Solve for the boundaries in brackets and prove them.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    brackets : list of Bracket
+
+    Returns
+    -------
+    list of list of Boundary
+        For each sample, ascending. Brackets whose ends have the same proved number of unstable modes
+        hold none.
+    """
+    exact: dict[int, ExactPencil] = {}
+    for i in {bracket.row for bracket in brackets}:
+        exact[i] = ExactPencil(sweep.constant[i], sweep.slope[i])
+    if not brackets:
+        return [[] for _ in range(len(sweep.constant))]
+    solved = [_solved(exact[one.row], one, int(sweep.mechanisms[one.row])) for one in brackets]
+    sides = np.array([[x * (1 - SIDE), x * (1 + SIDE)] for x, _ in solved])
+    row = np.array([one.row for one in brackets], np.intp)
+    near = _approximations(sweep, np.repeat(row, 2), sides.ravel()).reshape(len(row), 2, -1)
+    result: list[list[Boundary]] = [[] for _ in range(len(sweep.constant))]
+    for bracket, (friction, centre), ends, start in zip(brackets, solved, sides, near, strict=True):
+        prove = _flutter if bracket.change[0] else _divergence
+        own = exact[bracket.row]
+        boundary = prove(sweep, own, bracket, (friction, centre), ends, start)
+        if boundary.certified or _differs(sweep, own, bracket):
+            result[bracket.row].append(boundary)
+    ordered = (sorted(part, key=lambda one: one.friction) for part in result)
+    return [_beyond_rounding(sweep, i, part) for i, part in enumerate(ordered)]
+
+
+def _solved(exact: ExactPencil, bracket: Bracket, mechanisms: int) -> tuple[float, float]:
+    """Return the zero in a bracket, by a bracketed secant on exact values, and the root there."""
+    (x0, x1), (f0, f1) = bracket.friction, bracket.values
+    centre = bracket.centre
+    bits = exact.bits
+    if abs(sum(bracket.change)) > 1:
+        return float((x0 + x1) / 2), centre
+
+    def value(x: float) -> float:
+        nonlocal centre
+        if bracket.change[0]:
+            gap, centre = _exact_gap(exact, x, centre)
+            return gap
+        p = exact.at(x)
+        # Proportional to the product of the roots other than mechanisms.
+        return float(Fraction(int(p[mechanisms]), int(p[exact.n]) << (exact.n - mechanisms) * bits))
+
+    if np.isnan([f0, f1]).any() or not bracket.change[0]:
+        f0, f1 = value(x0), value(x1)
+    x = x0
+    for _ in range(100):
+        last = x
+        x = (x0 * f1 - x1 * f0) / (f1 - f0) if f1 != f0 else x0
+        if not min(x0, x1) < x < max(x0, x1):
+            x = (x0 + x1) / 2
+        f = value(x)
+        if f == 0 or abs(x - last) <= 1e-15 * abs(x):
+            break
+        # Illinois: an end that stays is weighed down, so that both ends come in.
+        if (f > 0) == (f1 > 0):
+            x1, f1, f0 = x, f, f0 / 2
+        else:
+            x0, f0, x1, f1 = x1, f1, x, f
+    return float(x), centre
+
+
+def _exact_gap(exact: ExactPencil, friction: float, centre: float) -> tuple[float, float]:
+    """Return the squared gap of the pair about `centre`, and its centre, from exact values.
+
+    About the extremum of p between the roots p is p'' / 2 ((w - m)^2 - gap^2 / 4) up to third order.
+    """
+    unit = 2.0**exact.exponent
+    p = exact.at(friction)
+    first = p.derivative()
+    second = first.derivative()
+    w = int(centre / unit)
+    for _ in range(3):
+        curvature = int(second(w))
+        if curvature == 0:
+            break
+        w -= round(int(first(w)) / curvature)
+    curvature = int(second(w))
+    offset = int(first(w)) / curvature
+    squared = 4 * (offset**2 - 2 * (int(p(w)) / curvature))
+    return squared * unit**2, (w - offset) * unit
+
+
+def _approximations(sweep: Sweep, row: Rows, friction: Array) -> Complex:
+    """Return approximations of all roots, mechanisms too, (N, n)."""
+    matrices = sweep.matrices(row, friction)
+    values: Complex = np.linalg.eigvals(matrices).astype(np.complex128)
+    sizes = sweep.sizes[row]
+    for size in np.unique(sizes[sizes > 0]):
+        same = np.flatnonzero(sizes == size)
+        values[same] = structured_values(matrices[same], values[same], int(size), sweep.mechanisms[row[same]])
+    return values
+
+
+def _flutter(
+    sweep: Sweep,
+    exact: ExactPencil,
+    bracket: Bracket,
+    solved: tuple[float, float],
+    sides: Array,
+    near: Complex,
+) -> Boundary:
+    """Return the boundary at which a pair of roots coalesces or parts, with what is proved of it."""
+    friction, centre = solved
+    m = int(sweep.mechanisms[bracket.row])
+    counts, mode = [], 0
+    for side, start in zip(sides, near, strict=True):
+        # The pair itself from its exact squared gap: approximations of it are not good enough.
+        gap, middle = _exact_gap(exact, float(side), centre)
+        rest = start[np.argsort(np.abs(start), kind="stable")[m:]]
+        rest = np.delete(rest, np.argsort(np.abs(rest - middle), kind="stable")[:2])
+        half = np.sqrt(complex(gap)) / 2
+        roots = np.concatenate([np.zeros(m), rest, [middle + half, middle - half]])
+        values = certify_polynomial(exact.at(float(side)), exact.exponent, roots, m, sweep.norm[bracket.row])
+        counts.append(None if values is None else int((values.imag > 0).sum()))
+        if gap < 0:
+            frequencies = np.sqrt(roots).real
+            mode = int((frequencies < frequencies[-1]).sum()) + 2
+    certified = None not in counts and counts[1] == (counts[0] or 0) + bracket.change[0]
+    frequency = float(np.sqrt(max(centre, 0.0)) / (2 * np.pi))
+    return Boundary(friction, sum(bracket.change), mode, frequency, certified)
+
+
+def _divergence(
+    sweep: Sweep,
+    exact: ExactPencil,
+    bracket: Bracket,
+    solved: tuple[float, float],
+    sides: Array,
+    near: Complex,
+) -> Boundary:
+    """Return the boundary at which a real root passes through zero.
+
+    Proved by the sign of the determinant on both sides, which mechanisms would make zero.
+    """
+    m = int(sweep.mechanisms[bracket.row])
+    signs = [int(exact.at(float(side))[0]) > 0 for side in sides]
+    certified = m == 0 and abs(bracket.change[1]) == 1 and signs[0] != signs[1]
+    return Boundary(solved[0], bracket.change[1], m + 1, 0.0, certified)
+
+
+def _differs(sweep: Sweep, exact: ExactPencil, bracket: Bracket) -> bool:
+    """Say whether the numbers of unstable roots proved at the ends of a bracket differ.
+
+    Raises
+    ------
+    InputError
+        If the mechanisms that were declared are not there.
+    """
+    m = int(sweep.mechanisms[bracket.row])
+    counts = []
+    near = _approximations(sweep, np.full(2, bracket.row), bracket.friction)
+    for friction, start in zip(bracket.friction, near, strict=True):
+        p = exact.at(float(friction))
+        values = certify_polynomial(p, exact.exponent, start, m, sweep.norm[bracket.row])
+        if values is None:
+            raise InputError(
+                f"sample {bracket.row} has fewer mechanisms than the {m} declared, at friction {friction}"
+            )
+        counts.append(((values.imag > 0) | (values.real < 0) & (values.imag == 0)).sum())
+    return bool(counts[0] != counts[1])
+
+
+def _beyond_rounding(sweep: Sweep, row: int, found: list[Boundary]) -> list[Boundary]:
+    """Return the boundaries without windows that the rounding of the entries alone has opened.
+
+    Where real eigenvalues cross without coupling, any change of the entries in their last digit
+    couples them over some 1e-7 of friction. Such a window opens and closes at once, and within it
+    no pair is farther from the real axis than rounding can put it.
+    """
+    kept: list[Boundary] = []
+    group: list[Boundary] = []
+    for one in [*found, None]:
+        if group and (one is None or one.friction - group[-1].friction > CLOSE):
+            if sum(part.direction for part in group) or not _within_rounding(sweep, row, group):
+                kept += group
+            group = []
+        if one is not None:
+            group.append(one)
+    return kept
+
+
+def _within_rounding(sweep: Sweep, row: int, group: list[Boundary]) -> bool:
+    """Say whether no pair of a window is proved by more than the rounding of its entries."""
+    size = int(sweep.sizes[row])
+    if not size:
+        return False
+    friction = np.linspace(group[0].friction, group[-1].friction, 17)
+    matrices = sweep.matrices(np.full(17, row), friction)
+    values, radius = structured_eigenvalues(matrices, np.linalg.eigvals(matrices).astype(complex), size)
+    # Only the pairs of the window: others are far from the axis at both its ends too.
+    here = np.abs(values - (2 * np.pi * group[0].frequency) ** 2) < 1e-6 * np.abs(values)
+    return bool((np.abs(values.imag) <= radius)[here].all())

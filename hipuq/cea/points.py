@@ -1,0 +1,158 @@
+"""Eigenvalues of undamped pencils A0 + mu A1 at many frictions: what the search for boundaries looks at.
+
+They only steer the search: whether a boundary is one is proved apart. So a root whose imaginary part
+is within its error bound counts as real here, and nothing needs a certificate unless the iteration
+that keeps the structure of the matrix cannot be used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hipuq.cea.bounds import AUTO, ZERO, Complex, norms
+from hipuq.cea.pencils import Array, Pencils
+from hipuq.cea.structured import block_sizes, structured_eigenvalues
+from hipuq.cea.undamped import judge, judged_roots
+
+Rows = NDArray[np.intp]
+
+BLOCK = 128
+"""Matrices whose eigenvalues are computed at once: they should stay in the cache."""
+
+
+@dataclass(frozen=True)
+class Points:
+    """Eigenvalues w at N frictions, mechanisms left out [1/s^2].
+
+    Attributes
+    ----------
+    row : (N,) array of int
+        Sample that the point belongs to.
+    friction : (N,) array
+        mu [1].
+    real : (N, n) array
+        Real roots, ascending, then NaN.
+    pairs : (N, n // 2) complex array
+        Upper roots of the pairs by ascending real part, then NaN.
+    """
+
+    row: Rows
+    friction: Array
+    real: Array
+    pairs: Complex
+
+    @property
+    def coalesced(self) -> Rows:
+        """Number of pairs, (N,)."""
+        count: Rows = (~np.isnan(self.pairs)).sum(axis=1)
+        return count
+
+    @property
+    def negative(self) -> Rows:
+        """Number of negative real roots, (N,)."""
+        count: Rows = (self.real < 0).sum(axis=1)
+        return count
+
+    def take(self, index: Rows) -> Points:
+        """Return some of the points."""
+        return Points(self.row[index], self.friction[index], self.real[index], self.pairs[index])
+
+    def __add__(self, other: Points) -> Points:
+        """Return these points and then the others."""
+        names = ("row", "friction", "real", "pairs")
+        return Points(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
+
+
+class Sweep:
+    """The pencils of a batch as functions of friction.
+
+    Parameters
+    ----------
+    pencils : Pencils
+        s samples without damping; their own friction is not used.
+
+    Attributes
+    ----------
+    constant, slope : (s, n, n) array
+        A0 and A1 [1/s^2].
+    norm : (s,) array
+        Largest Frobenius norm that A0 and A1 times the largest friction have [1/s^2].
+    scale : (s,) array
+        Size of the eigenvalues [1/s^2].
+    """
+
+    def __init__(self, pencils: Pencils, upper: float) -> None:
+        self.constant, self.slope = pencils.reduced_parts()
+        self.mechanisms = pencils.mechanisms
+        self.filter_radius = pencils.filter_radius
+        self.norm = np.maximum(norms(self.constant), norms(self.slope) * upper)
+        self.scale = self.norm / np.sqrt(self.constant.shape[1])
+        self.sizes = block_sizes((self.constant != 0) + (self.slope != 0.0).astype(float))
+
+    def matrices(self, row: Rows, friction: Array) -> Array:
+        """Return A0 + mu A1, (N, n, n) [1/s^2]."""
+        made: Array = self.slope[row] * friction[:, None, None]
+        made += self.constant[row]
+        return made
+
+    def points(self, row: Rows, friction: Array) -> Points:
+        """Return the eigenvalues of samples at frictions."""
+        values = np.empty((len(row), self.constant.shape[1]), np.complex128)
+        for start in range(0, len(row), BLOCK):
+            block = slice(start, start + BLOCK)
+            values[block] = self._values(row[block], friction[block])
+        # The declared mechanisms, the smallest roots, become NaN and sort last.
+        rank = np.argsort(np.argsort(np.abs(values), axis=1, kind="stable"), axis=1)
+        values[rank < self.mechanisms[row][:, None]] = complex(np.nan, np.nan)
+        real = np.sort(np.where(values.imag == 0, values.real, np.nan), axis=1)
+        upper = np.where(values.imag > 0, values, complex(np.nan, np.nan))
+        pairs = np.sort(upper, axis=1)[:, : values.shape[1] // 2]
+        return Points(row, friction, real, pairs)
+
+    def _values(self, row: Rows, friction: Array) -> Complex:
+        """Return all eigenvalues, those that are real within their bounds exactly so."""
+        matrices = self.matrices(row, friction)
+        mechanisms = self.mechanisms[row]
+        values: Complex = np.linalg.eigvals(matrices).astype(np.complex128)
+        norm = norms(matrices)[:, None]
+        radius = np.broadcast_to((self.filter_radius or np.inf) * norm, values.shape)
+        _, known = judge(values, radius, ZERO * norm, mechanisms, 0.0)
+        unclear = np.flatnonzero(~known.all(axis=1))
+        sizes = self.sizes[row[unclear]]
+        for size in np.unique(sizes):
+            same = unclear[sizes == size]
+            part = matrices[same], mechanisms[same]
+            if size:
+                values[same] = structured_values(part[0], values[same], int(size), part[1])
+            else:
+                values[same] = judged_roots(*part, 0.0, AUTO, self.filter_radius).values
+        return values
+
+
+def structured_values(matrices: Array, start: Complex, size: int, mechanisms: Rows) -> Complex:
+    """Return eigenvalues from the structured solver, real ones and pairs told apart as its bounds can.
+
+    Parameters
+    ----------
+    matrices : (s, n, n) array
+    start : (s, n) complex array
+        Approximations.
+    size : int
+        Block size.
+    mechanisms : (s,) array of int
+
+    Returns
+    -------
+    (s, n) complex array
+    """
+    rank = np.argsort(np.argsort(np.abs(start), axis=1, kind="stable"), axis=1)
+    zero = (rank < mechanisms[:, None]) & (np.abs(start) <= ZERO * norms(matrices)[:, None])
+    values, radius = structured_eigenvalues(
+        matrices, np.where(zero, 0.0, start), size, fixed=zero, rough=True
+    )
+    found = np.isfinite(radius)
+    values = np.where(found & (np.abs(values.imag) <= radius), values.real, values)
+    return np.where(found.all(axis=1, keepdims=True), values, start)
