@@ -240,13 +240,20 @@ def _beyond_rounding(sweep: Sweep, row: int, found: list[Boundary]) -> list[Boun
 
 
 def _within_rounding(sweep: Sweep, row: int, group: list[Boundary]) -> bool:
-    """Say whether no pair of a window is proved by more than the rounding of its entries."""
+    """Say whether the rounding of the entries can have opened a window.
+
+    It can where no pair inside is farther from the real axis than its bound or, of a window in which
+    a pair has parted, where its real roots are nowhere apart.
+    """
     size = int(sweep.sizes[row])
     if not size:
         return False
     friction = np.linspace(group[0].friction, group[-1].friction, 17)
     matrices = sweep.matrices(np.full(17, row), friction)
     values, radius = structured_eigenvalues(matrices, np.linalg.eigvals(matrices).astype(complex), size)
-    # Only the pairs of the window: others are far from the axis at both its ends too.
-    here = np.abs(values - (2 * np.pi * group[0].frequency) ** 2) < 1e-6 * np.abs(values)
-    return bool((np.abs(values.imag) <= radius)[here].all())
+    near = np.abs(values - (2 * np.pi * group[0].frequency) ** 2)
+    if group[0].direction > 0:
+        # Only the pairs of the window: others are far from the axis at both its ends too.
+        return not ((near < 1e-6 * np.abs(values)) & (np.abs(values.imag) > radius)).any()
+    own, bound = (np.take_along_axis(part, near.argsort(axis=1)[:, :2], axis=1) for part in (values, radius))
+    return not (np.abs(own[:, 1] - own[:, 0]) > bound.sum(axis=1)).any()

@@ -5,6 +5,7 @@ Intervals of friction come as three `Points`: their lower ends, middles and uppe
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,7 +58,8 @@ def vanishing(points: Triple) -> tuple[Mask, Array]:
     """Say which intervals may hold a zero of a squared gap, though no count differs at their points.
 
     A gap that stays larger than its second difference, or whose square does, cannot vanish: the
-    gap is smooth where two real roots cross without coupling, its square where they merge.
+    gap is smooth where two real roots cross without coupling, its square where they merge. Both are
+    so only while no third root comes near, so the gaps between all roots must pass, complex ones too.
 
     Parameters
     ----------
@@ -77,6 +79,7 @@ def vanishing(points: Triple) -> tuple[Mask, Array]:
     squared = np.square(gap)
     paired = np.stack([_matched(point.pairs, m.pairs) for point in points])
     roots = np.abs(np.stack([point.real for point in points]))
+    every = _packed(np.stack([point.real for point in points]), paired)
     sure = [_stays(np.square(paired.imag)), _stays(roots)]
     # Parabola of the squared gap over -1, 0, 1: c t^2 + s t + e, lowest at t = -s / 2c.
     c = (squared[0] - 2 * squared[1] + squared[2]) / 2
@@ -90,13 +93,31 @@ def vanishing(points: Triple) -> tuple[Mask, Array]:
     k = np.argmin(low, axis=1)
     rows = np.arange(len(k))
     vertex = np.where(np.isfinite(low[rows, k]), m.friction + t[rows, k] * width[:, 0] / 2, np.nan)
+    sure += [_stays(part) | _stays(np.square(part)) for part in _differences(every)]
     return ~(clear.all(axis=1) & np.all(np.concatenate(sure, axis=1), axis=1)), vertex
 
 
-def _stays(values: Array) -> Mask:
-    """Say whether positive values at three points stay larger than their second difference; NaN do."""
+def _packed(real: Array, pairs: Complex) -> Complex:
+    """Return real roots, upper and lower ones of the pairs in columns, without the gaps of NaN."""
+    every = np.concatenate([real, pairs, pairs.conj()], axis=-1)
+    order = np.argsort(np.isnan(every[0]), axis=1, kind="stable")[:, : real.shape[-1]]
+    return np.stack([np.take_along_axis(one, order, axis=1) for one in every])
+
+
+def _differences(roots: Complex) -> Iterator[Complex]:
+    """Give the differences between roots that are not real neighbours, (3, N, k)."""
+    both_real = (roots.imag == 0).all(axis=0)
+    for shift in range(1, roots.shape[-1]):
+        part = roots[..., shift:] - roots[..., :-shift]
+        if shift == 1:
+            part[:, both_real[:, 1:] & both_real[:, :-1]] = np.nan
+        yield part
+
+
+def _stays(values: Array | Complex) -> Mask:
+    """Say whether values at three points stay larger than their second difference; NaN do."""
     bend = np.abs(values[0] - 2 * values[1] + values[2])
-    return np.asarray((values.min(axis=0) > bend) | np.isnan(bend))
+    return np.asarray((np.abs(values).min(axis=0) > bend) | np.isnan(bend))
 
 
 def _matched(pairs: Complex, reference: Complex) -> Complex:
@@ -137,8 +158,8 @@ def crossing(points: Triple) -> tuple[list[Bracket | None], Array]:
     for counts, other, follow in ((pairs, negative, _merged), (negative, pairs, _negated)):
         fit = (np.abs(counts[2] - counts[0]) == 1) & (other == other[0]).all(axis=0)
         fit &= (counts[1] == counts[0]) | (counts[1] == counts[2])
-        for i in np.flatnonzero(fit):
-            values[:, i], centre[:, i] = follow(points, rest, counts[:, i], int(i))
+        for j in np.flatnonzero(fit):
+            values[:, j], centre[:, j] = follow(points, rest, counts[:, j], int(j))
     bend = np.abs(values[0] - 2 * values[1] + values[2])
     with np.errstate(invalid="ignore"):
         single = bend <= STRAIGHT * np.abs(values[2] - values[0])
@@ -146,7 +167,8 @@ def crossing(points: Triple) -> tuple[list[Bracket | None], Array]:
     single &= ~open_
     zero = np.full(len(single), np.nan)
     found: list[Bracket | None] = [None] * len(single)
-    for i in np.flatnonzero(single):
+    for k in np.flatnonzero(single):
+        i = int(k)
         zero[i] = _secant(points, values[:, i], i)
         if pairs[0, i] != pairs[2, i] and not _isolated(rest, values[:, i], centre[:, i], i):
             continue
