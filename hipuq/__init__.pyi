@@ -7,6 +7,7 @@ from .driver import estimate as estimate
 from .driver import run as run
 from .errors import HipuqError as HipuqError
 from .evaluation import evaluate as evaluate
+from .friction import integrate_friction as integrate_friction
 from .inputs import Inputs as Inputs
 from .models.sensitivity import onset_sensitivity as onset_sensitivity
 from .store import load_outcomes as load_outcomes

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import HipuqError, InputError, ModelError, SchemaError, unknown_name
@@ -20,7 +21,7 @@ from hipuq.sampling import check_count
 Model = Callable[..., xr.Dataset]
 
 BLOCK = 1024
-"""Samples handed to the model at a time."""
+"""Samples handed to the model at a time, unless it says in an attribute ``block`` how many it takes."""
 
 
 def evaluate(
@@ -70,7 +71,8 @@ def evaluate(
     if callable(checker):
         checker(samples)
     jobs = (os.cpu_count() or 1) if n_jobs is None else check_count("n_jobs", n_jobs)
-    blocks = [slice(start, min(start + BLOCK, size)) for start in range(0, size, BLOCK)]
+    step = check_count("block of the model", getattr(model, "block", BLOCK))
+    blocks = [slice(start, min(start + step, size)) for start in range(0, size, step)]
     started = time.perf_counter()
     parts: list[xr.Dataset | None] = [None] * len(blocks)
     with _workers(jobs, executor) as pool, _progress(size, progress) as advance:
@@ -88,7 +90,7 @@ def evaluate(
                 future.cancel()
             raise
     outputs = _joined([part for part in parts if part is not None])
-    outcomes = samples.assign(outputs.data_vars).assign_coords(outputs.coords)
+    outcomes = samples.assign(_outputs(outputs)).assign_coords(outputs.coords)
     if "status" not in outcomes:
         outcomes["status"] = _status(outcomes, list(outputs.data_vars))
     label = str(getattr(model, "label", getattr(model, "__qualname__", type(model).__qualname__)))
@@ -132,7 +134,7 @@ def _block(model: Model, samples: xr.Dataset, keep: tuple[str, ...] | None, star
         raise SchemaError(
             f"the model returned {both[0]!r}, which is a name in the samples: return the outputs alone"
         )
-    for name, values in given.data_vars.items():
+    for name, values in _outputs(given).items():
         if values.sizes.get("sample") != size:
             raise SchemaError(
                 f"output {str(name)!r} of the model has the dims {dict(values.sizes)}: "
@@ -147,7 +149,14 @@ def _block(model: Model, samples: xr.Dataset, keep: tuple[str, ...] | None, star
             raise unknown_name("outcome in keep", missing[0], [str(name) for name in given.data_vars])
         always = [name for name in ("status", "decided_by") if name in given and name not in keep]
         given = given[[*keep, *always]]
-    return given.drop_vars([name for name in given.coords if "sample" in given[name].dims])
+    made = _outputs(given)
+    return given.drop_vars([n for n in given.coords if "sample" in given[n].dims and n not in made])
+
+
+def _outputs(given: xr.Dataset) -> dict[Hashable, xr.DataArray]:
+    """Return what a model gave: xarray takes one named like a dim of its own for a coordinate."""
+    named = {name: values for name, values in given.coords.items() if name in values.dims and values.ndim > 1}
+    return {**given.data_vars, **named}
 
 
 def _in_order(given: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
@@ -171,12 +180,28 @@ def _joined(parts: list[xr.Dataset]) -> xr.Dataset:
     """Return the blocks one after the other; xr.concat would compare coords block by block."""
     first = parts[0]
     data: dict[Any, Any] = {}
-    for name, values in first.data_vars.items():
+    for name, values in _outputs(first).items():
         if any(name not in part or part[name].dims != values.dims for part in parts):
             raise SchemaError(f"the model returned {str(name)!r} with different dims in different blocks")
         axis = values.dims.index("sample")
-        data[name] = (values.dims, np.concatenate([p[name].values for p in parts], axis), values.attrs)
-    return xr.Dataset(data, coords=first.coords)
+        arrays = _padded([part[name].values for part in parts], axis)
+        data[name] = (values.dims, np.concatenate(arrays, axis), values.attrs)
+    coords = {name: values for name, values in first.coords.items() if name not in data}
+    return xr.Dataset(data, coords=coords)
+
+
+def _padded(arrays: list[NDArray[Any]], axis: int) -> list[NDArray[Any]]:
+    """Return float arrays made equally long but for one axis, with NaN: blocks may need different lengths."""
+    shape = np.max([array.shape for array in arrays], axis=0)
+    made = []
+    for array in arrays:
+        width = [(0, int(n) - k) for n, k in zip(shape, array.shape, strict=True)]
+        width[axis] = (0, 0)
+        padding = any(after for _, after in width)
+        if padding and array.dtype.kind != "f":
+            raise SchemaError("the model returned arrays of different lengths in different blocks")
+        made.append(np.pad(array, width, constant_values=np.nan) if padding else array)
+    return made
 
 
 def _status(outcomes: xr.Dataset, outputs: list[Any]) -> xr.DataArray:

@@ -87,6 +87,23 @@ OUTCOMES: dict[str, Variable] = {
 }
 """Outcomes of a complex eigenvalue analysis, see :mod:`hipuq.cea`."""
 
+INTEGRATED: dict[str, Variable] = {
+    "probability": Variable("probability of instability over friction", role=PROBABILITY),
+    "probability_low": Variable(
+        "probability of instability over friction, unknown as stable", role=PROBABILITY
+    ),
+    "probability_high": Variable(
+        "probability of instability over friction, unknown as unstable", role=PROBABILITY
+    ),
+    "probability_by_mode": Variable(
+        "probability of instability over friction by mode", dims=("sample", "mode"), role=PROBABILITY
+    ),
+    "onset": Variable("friction at the onset of instability (inf: never)"),
+    "interval": Variable("ends of an unstable interval of friction", dims=("sample", "interval", "bound")),
+    "interval_count": Variable("number of unstable intervals of friction"),
+}
+"""Outcomes of a model whose friction is integrated, see :mod:`hipuq.friction`."""
+
 STATUS = {"ok": 0, "undecided": 1, "failed": 2}
 """Flags of the outcome variable ``status``."""
 

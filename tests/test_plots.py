@@ -225,6 +225,72 @@ def test_occurrence_refuses(results):
         plots.occurrence_panels(results.isel(mode=0))
 
 
+@pytest.fixture(scope="module")
+def exact(results):
+    """What an exact analysis gives: the same quantities, no limits, here with values of their own."""
+    names = ["probability_min", "probability_mean", "probability_max"]
+    return (0.9 * results[names]).assign_attrs(method="exact")
+
+
+def test_exact_values_stand_beside_sampled_ones(results, exact):
+    ax = drawn(plots.occurrence(results, 7, exact=exact))
+    part = exact.sel(count=7, mode=slice(11, 18))
+    bars = line(ax, "exact")
+    wanted = 100 * np.concatenate([part[f"probability_{end}"] for end in ("min", "mean", "max")])
+    np.testing.assert_allclose(bars.get_ydata(), wanted)
+    np.testing.assert_array_equal(bars.get_xdata(), np.tile(np.arange(8), 3))
+    assert sorted(labels(ax)) == ["exact", "maximum", "mean, 95 % interval", "minimum"]
+    # Nothing sampled is drawn otherwise than without them.
+    np.testing.assert_array_equal(means(ax), means(plots.occurrence(results, 7)))
+
+
+def test_exact_values_are_found_by_count_and_mode(results, exact):
+    other = exact.isel(count=slice(None, None, -1), mode=slice(None, None, -1))
+    before = other.copy(deep=True)
+    one, two = (plots.occurrence(results, 8, exact=data, modes=[18, 16]) for data in (exact, other))
+    np.testing.assert_array_equal(line(one, "exact").get_xydata(), line(two, "exact").get_xydata())
+    assert other.identical(before)
+
+
+def test_exact_values_in_panels_have_one_legend_entry(results, exact):
+    axes = plots.occurrence_panels(results, exact=exact)
+    drawn(axes[0, 0])
+    texts = [text.get_text() for text in axes[0, 0].figure.legends[0].get_texts()]
+    assert texts.count("exact") == 1 and len(texts) == 4
+    for ax, count in zip(axes.flat, (6, 7, 8, 9), strict=True):
+        highest = 100 * exact["probability_max"].sel(count=count)
+        assert line(ax, "exact").get_ydata().max() == pytest.approx(float(highest.max()))
+
+
+def test_unknown_exact_values_are_left_out(results, exact):
+    ax = drawn(plots.occurrence(results, 8, exact=exact * np.nan))
+    assert np.isnan(line(ax, "exact").get_ydata()).all()
+    assert not ax.texts
+
+
+def test_exact_results_stand_alone(results, exact):
+    exact = exact.assign_attrs(confidence=0.95)
+    ax = drawn(plots.occurrence(exact, 7))
+    np.testing.assert_allclose(means(ax), 100 * exact["probability_mean"].sel(count=7, mode=slice(11, 18)))
+    assert sorted(labels(ax)) == ["maximum", "mean", "minimum"]
+    assert plots.occurrence_panels(exact).shape == (2, 2)
+    certain = exact.assign({f"probability_mean_{end}": exact["probability_mean"] for end in ("low", "high")})
+    assert sorted(labels(plots.occurrence(certain, 7))) == ["maximum", "mean", "minimum"]
+    open_ = certain.assign(probability_mean_high=certain["probability_mean"] + 0.1)
+    assert "mean, limits of the unknown" in labels(plots.occurrence(open_, 7))
+
+
+def test_exact_results_of_another_kind_are_refused(results, exact):
+    with pytest.raises(SchemaError, match=r"'probability_max' over \(count, mode\).*'probability_by_mode'"):
+        plots.occurrence(results, 7, exact=exact.drop_vars("probability_max"))
+    with pytest.raises(SchemaError, match="over \\(count, mode\\)"):
+        plots.occurrence_panels(results, exact=exact.isel(count=0))
+    with pytest.raises(InputError, match=r"count of the exact results is \[6, 7\].*\[6, 7, 8, 9\]"):
+        plots.occurrence(results, 7, exact=exact.sel(count=[6, 7]))
+    with pytest.raises(InputError, match="mode of the exact results"):
+        plots.occurrence_panels(results, exact=exact.sel(mode=slice(11, 18)))
+
+
 # Mode shapes
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from hipuq.cea.bounds import Complex
 from hipuq.cea.certificate import certify_polynomial
-from hipuq.cea.exact import ExactPencil
+from hipuq.cea.exact import ExactPencil, exact_gap
 from hipuq.cea.gaps import Bracket
 from hipuq.cea.pencils import Array
 from hipuq.cea.points import Rows, Sweep, structured_values
@@ -69,7 +69,7 @@ def proved(sweep: Sweep, brackets: list[Bracket]) -> list[list[Boundary]]:
     if not brackets:
         return [[] for _ in range(len(sweep.constant))]
     solved = [_solved(exact[one.row], one, int(sweep.mechanisms[one.row])) for one in brackets]
-    sides = np.array([[x * (1 - SIDE), x * (1 + SIDE)] for x, _ in solved])
+    sides = np.array([[x - SIDE * abs(x), x + SIDE * abs(x)] for x, _ in solved])
     row = np.array([one.row for one in brackets], np.intp)
     near = _approximations(sweep, np.repeat(row, 2), sides.ravel()).reshape(len(row), 2, -1)
     result: list[list[Boundary]] = [[] for _ in range(len(sweep.constant))]
@@ -85,59 +85,37 @@ def proved(sweep: Sweep, brackets: list[Bracket]) -> list[list[Boundary]]:
 
 def _solved(exact: ExactPencil, bracket: Bracket, mechanisms: int) -> tuple[float, float]:
     """Return the zero in a bracket, by a bracketed secant on exact values, and the root there."""
-    (x0, x1), (f0, f1) = bracket.friction, bracket.values
-    centre = bracket.centre
-    bits = exact.bits
+    (x0, x1), (f0, f1), (c0, c1) = bracket.friction, bracket.values, bracket.centre
     if abs(sum(bracket.change)) > 1:
-        return float((x0 + x1) / 2), centre
+        return float((x0 + x1) / 2), float(c0)
 
-    def value(x: float) -> float:
-        nonlocal centre
+    def value(x: float, centre: float, gap: float) -> tuple[float, float]:
         if bracket.change[0]:
-            gap, centre = _exact_gap(exact, x, centre)
-            return gap
+            return exact_gap(exact, x, centre, gap)
         p = exact.at(x)
         # Proportional to the product of the roots other than mechanisms.
-        return float(Fraction(int(p[mechanisms]), int(p[exact.n]) << (exact.n - mechanisms) * bits))
+        ratio = Fraction(int(p[mechanisms]), int(p[exact.n]) << (exact.n - mechanisms) * exact.bits)
+        return float(ratio), 0.0
 
     if np.isnan([f0, f1]).any() or not bracket.change[0]:
-        f0, f1 = value(x0), value(x1)
-    x = x0
+        (f0, c0), (f1, c1) = value(float(x0), float(c0), 0.0), value(float(x1), float(c1), 0.0)
+    x, centre = float(x0), float(c0)
     for _ in range(100):
         last = x
-        x = (x0 * f1 - x1 * f0) / (f1 - f0) if f1 != f0 else x0
+        x = float((x0 * f1 - x1 * f0) / (f1 - f0) if f1 != f0 else x0)
         if not min(x0, x1) < x < max(x0, x1):
-            x = (x0 + x1) / 2
-        f = value(x)
-        if f == 0 or abs(x - last) <= 1e-15 * abs(x):
+            x = float((x0 + x1) / 2)
+        # Gap and middle of the pair are smooth in friction: a line through two values finds it again.
+        t = (x - x0) / (x1 - x0)
+        f, centre = value(x, float(c0 + (c1 - c0) * t), float(f0 + (f1 - f0) * t))
+        if f == 0 or np.isnan(f) or abs(x - last) <= 1e-15 * abs(x):
             break
         # Illinois: an end that stays is weighed down, so that both ends come in.
         if (f > 0) == (f1 > 0):
-            x1, f1, f0 = x, f, f0 / 2
+            x1, f1, c1, f0 = x, f, centre, f0 / 2
         else:
-            x0, f0, x1, f1 = x1, f1, x, f
-    return float(x), centre
-
-
-def _exact_gap(exact: ExactPencil, friction: float, centre: float) -> tuple[float, float]:
-    """Return the squared gap of the pair about `centre`, and its centre, from exact values.
-
-    About the extremum of p between the roots p is p'' / 2 ((w - m)^2 - gap^2 / 4) up to third order.
-    """
-    unit = 2.0**exact.exponent
-    p = exact.at(friction)
-    first = p.derivative()
-    second = first.derivative()
-    w = int(centre / unit)
-    for _ in range(3):
-        curvature = int(second(w))
-        if curvature == 0:
-            break
-        w -= round(int(first(w)) / curvature)
-    curvature = int(second(w))
-    offset = int(first(w)) / curvature
-    squared = 4 * (offset**2 - 2 * (int(p(w)) / curvature))
-    return squared * unit**2, (w - offset) * unit
+            x0, f0, c0, x1, f1, c1 = x1, f1, c1, x, f, centre
+    return x, centre
 
 
 def _approximations(sweep: Sweep, row: Rows, friction: Array) -> Complex:
@@ -162,10 +140,14 @@ def _flutter(
     """Return the boundary at which a pair of roots coalesces or parts, with what is proved of it."""
     friction, centre = solved
     m = int(sweep.mechanisms[bracket.row])
-    counts, mode = [], 0
+    counts: list[int | None] = []
+    mode = 0
     for side, start in zip(sides, near, strict=True):
         # The pair itself from its exact squared gap: approximations of it are not good enough.
-        gap, middle = _exact_gap(exact, float(side), centre)
+        gap, middle = exact_gap(exact, float(side), centre, 0.0)
+        if np.isnan(gap):
+            counts.append(None)
+            continue
         rest = start[np.argsort(np.abs(start), kind="stable")[m:]]
         rest = np.delete(rest, np.argsort(np.abs(rest - middle), kind="stable")[:2])
         half = np.sqrt(complex(gap)) / 2

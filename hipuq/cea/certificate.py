@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hipuq.cea.bounds import EPS, SAFETY, ZERO, Complex
-from hipuq.cea.exact import integers
+from hipuq.cea.exact import integers, scaled, whole
 from hipuq.cea.pencils import Array
 
 Mask = NDArray[np.bool_]
@@ -232,26 +232,23 @@ def _discs(polynomial: Any, exponent: int, values: Complex) -> tuple[Complex, Ar
     The products are added up as logarithms: tight clusters would leave the range of doubles.
     """
     n = len(values)
-    real = [_whole(x, exponent) for x in values.real.tolist()]
-    imag = [_whole(x, exponent) for x in values.imag.tolist()]
+    real = [whole(x, exponent) for x in values.real.tolist()]
+    imag = [whole(x, exponent) for x in values.imag.tolist()]
     coefficients = list(reversed(polynomial.coeffs()))
     lead = math.log2(abs(int(coefficients[0])))
-    size = np.array([_log_modulus(coefficients, x, y) for x, y in zip(real, imag, strict=True)])
-    parts = [np.array([_scaled(x, exponent) for x in part]) for part in (real, imag)]
+    size = np.array(
+        [
+            _log_modulus(coefficients, x, y) if y else _log2(int(polynomial(x)))
+            for x, y in zip(real, imag, strict=True)
+        ]
+    )
+    parts = [np.array([scaled(x, exponent) for x in part]) for part in (real, imag)]
     centres = parts[0] + 1j * parts[1]
     gaps = np.abs(centres[:, None] - centres[None, :])
     np.fill_diagonal(gaps, 1.0)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         radius = n * np.exp2(size - lead + n * exponent - np.log2(gaps).sum(axis=1))
     return centres, np.where(np.isnan(radius), np.inf, radius) * _OUTWARDS
-
-
-def _whole(number: float, exponent: int) -> int:
-    """Return number / 2**exponent, rounded down to an integer."""
-    mantissa, power = math.frexp(number)
-    shift = power - 53 - exponent
-    whole = int(mantissa * 2.0**53)
-    return whole << shift if shift >= 0 else whole >> -shift
 
 
 def _log_modulus(coefficients: list[Any], x: int, y: int) -> float:
@@ -265,10 +262,10 @@ def _log_modulus(coefficients: list[Any], x: int, y: int) -> float:
     return math.log2(modulus) + drop if modulus > 0 else -math.inf
 
 
-def _scaled(number: int, exponent: int) -> float:
-    """Return number * 2**exponent, rounded."""
-    drop = max(0, number.bit_length() - 64)
-    return math.ldexp(float(number >> drop), drop + exponent)
+def _log2(number: int) -> float:
+    """Return log2 |number|."""
+    drop = max(0, number.bit_length() - 500)
+    return math.log2(abs(number) >> drop) + drop if number else -math.inf
 
 
 def _isolated(polynomial: Any, exponent: int) -> tuple[Complex, Array, NDArray[np.intp]]:

@@ -7,12 +7,19 @@ be evaluated at any double mu in microseconds and without any error.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from hipuq.cea.pencils import Array
+
+MOST_STEPS = 30
+"""Steps after which the iteration for a pair of roots is given up."""
+
+FINE = 40
+"""Bits of a squared gap, in units of the root, from which whole numbers resolve it well."""
 
 
 class ExactPencil:
@@ -55,6 +62,85 @@ class ExactPencil:
         powers = [fmpz(top) ** j << down * (self.degree - j) for j in range(self.degree + 1)]
         made = self._rows * fmpz_mat(self.degree + 1, 1, powers)
         return fmpz_poly([made[k, 0] for k in range(self.n + 1)])
+
+
+def exact_gap(exact: ExactPencil, friction: float, centre: float, gap: float) -> tuple[float, float]:
+    """Return the squared gap of a pair of roots and their middle, from exact values.
+
+    The pair is a quadratic factor of the characteristic polynomial, well determined also where its two
+    roots are one; found by the iteration of Bairstow in whole numbers.
+
+    Parameters
+    ----------
+    exact : ExactPencil
+    friction : float
+        mu [1].
+    centre, gap : float
+        Approximate middle [1/s^2] and squared gap [1/s^4] of the pair.
+
+    Returns
+    -------
+    gap : float
+        (w1 - w2)**2, negative for a complex pair [1/s^4]; NaN where the iteration does not converge.
+    centre : float
+        [1/s^2]
+    """
+    from flint import fmpz_poly
+
+    p = exact.at(friction)
+    s = whole(centre, exact.exponent - 1)
+    q = (s * s - whole(gap, 2 * exact.exponent)) // 4
+    for _ in range(MOST_STEPS):
+        # p = b (w^2 - s w + q) + r, and the correction of s and q is that which makes r vanish.
+        quadratic = fmpz_poly([q, -s, 1])
+        b, r = divmod(p, quadratic)
+        t = b % quadratic
+        r0, r1, t0, t1 = int(r[0]), int(r[1]), int(t[0]), int(t[1])
+        det = -(t1 * s + t0) * t0 - t1 * t1 * q
+        if det == 0:
+            break
+        ds, dq = (r1 * t0 - t1 * r0) // det, (-(t1 * s + t0) * r0 - t1 * q * r1) // det
+        s, q = s + ds, q + dq
+        if abs(ds) <= 2:
+            found = s * s - 4 * q
+            if abs(found).bit_length() < s.bit_length() + FINE:
+                return _gap_about(p, s // 2, exact.exponent)
+            return scaled(found, 2 * exact.exponent), scaled(s, exact.exponent - 1)
+    return math.nan, centre
+
+
+def _gap_about(p: Any, w: int, exponent: int) -> tuple[float, float]:
+    """Return squared gap and middle of a pair of roots so close that whole numbers do not resolve it.
+
+    About the extremum of p between the roots p is p'' / 2 ((w - m)^2 - gap^2 / 4) up to third order.
+    """
+    first = p.derivative()
+    curvature = int(first.derivative()(w))
+    if curvature == 0:
+        return math.nan, scaled(w, exponent)
+    slope = int(first(w))
+    squared = _ratio(4 * (slope * slope - 2 * int(p(w)) * curvature), curvature * curvature, 2 * exponent)
+    return squared, _ratio(w * curvature - slope, curvature, exponent)
+
+
+def _ratio(top: int, bottom: int, exponent: int) -> float:
+    """Return top / bottom * 2**exponent, rounded."""
+    shift = max(0, 70 + bottom.bit_length() - top.bit_length())
+    return scaled((top << shift) // bottom, exponent - shift)
+
+
+def whole(number: float, exponent: int) -> int:
+    """Return number / 2**exponent, rounded down to an integer."""
+    mantissa, power = math.frexp(number)
+    shift = power - 53 - exponent
+    digits = int(mantissa * 2.0**53)
+    return digits << shift if shift >= 0 else digits >> -shift
+
+
+def scaled(number: int, exponent: int) -> float:
+    """Return number * 2**exponent, rounded, also where the number is beyond the range of doubles."""
+    drop = max(0, number.bit_length() - 64)
+    return math.ldexp(float(number >> drop), drop + exponent)
 
 
 def integers(values: Array) -> tuple[list[int], int]:

@@ -27,6 +27,9 @@ PARABOLIC = 16 * NARROWEST
 STRAIGHT = 0.25
 """Second difference of a squared gap, over its first, below which it passes through zero only once."""
 
+ISOLATED = 3.0
+"""Distance of other roots from a merging pair, over half its gap and its way, from which they are apart."""
+
 
 @dataclass(frozen=True)
 class Bracket:
@@ -43,15 +46,15 @@ class Bracket:
         end to the upper one.
     values : (2,) array
         The squared gap [1/s^4], or the root w itself [1/s^2], at the ends; NaN where not known.
-    centre : float
-        Root w about which it happens [1/s^2].
+    centre : (2,) array
+        Middle of the two roots w, or the root itself, at the ends [1/s^2].
     """
 
     row: int
     friction: Array
     change: tuple[int, int]
     values: Array
-    centre: float
+    centre: Array
 
 
 def vanishing(points: Triple) -> tuple[Mask, Array]:
@@ -90,6 +93,9 @@ def vanishing(points: Triple) -> tuple[Mask, Array]:
     window = np.sqrt(np.maximum(depth, 0.0)) * width
     clear = _stays(gap) | _stays(squared) | ((width <= PARABOLIC) & bowl & (window < NARROWEST))
     low = np.where(~clear & bowl, squared[1] - c * np.square(t), np.inf)
+    if not low.shape[1]:
+        # A single root has no gap.
+        low, t = np.full((len(low), 1), np.inf), np.zeros((len(low), 1))
     k = np.argmin(low, axis=1)
     rows = np.arange(len(k))
     vertex = np.where(np.isfinite(low[rows, k]), m.friction + t[rows, k] * width[:, 0] / 2, np.nan)
@@ -145,8 +151,8 @@ def crossing(points: Triple) -> tuple[list[Bracket | None], Array]:
     Returns
     -------
     brackets : list of Bracket or None
-        None where more than one thing may pass through zero, it may do so more than once, or the pair
-        that merges is not yet far from the other roots against its own gap.
+        None where more than one thing may pass through zero, it may do so more than once, or other
+        roots come as near to the pair that merges as its own gap.
     zero : (N,) array
         Estimate of the friction at which it happens, NaN where there is none.
     """
@@ -179,7 +185,7 @@ def crossing(points: Triple) -> tuple[list[Bracket | None], Array]:
             np.array([points[j].friction[i] for j in ends]),
             (int(pairs[2, i] - pairs[0, i]), int(negative[2, i] - negative[0, i])),
             values[ends, i],
-            float(centre[ends, i][np.argmin(values[ends, i])]),
+            centre[ends, i],
         )
     return found, zero
 
@@ -193,12 +199,12 @@ def _secant(points: Triple, values: Array, i: int) -> float:
 
 
 def _isolated(rest: list[Points], values: Array, centre: Array, i: int) -> bool:
-    """Say whether the pair that merges stays far from all other roots against its gap and its way."""
+    """Say whether all other roots stay farther from the pair that merges than its own gap and way."""
     own = np.sqrt(np.abs(values)).max() / 2 + np.ptp(centre)
     others = np.concatenate(
         [np.append(point.real[i], point.pairs[i]) - x for point, x in zip(rest, centre, strict=True)]
     )
-    return bool(np.nanmin(np.abs(others), initial=np.inf) > 3 * own)
+    return bool(np.nanmin(np.abs(others), initial=np.inf) > ISOLATED * own)
 
 
 def _merged(points: Triple, rest: list[Points], counts: NDArray[np.intp], i: int) -> tuple[Array, Array]:
@@ -265,4 +271,4 @@ def unresolved(points: Triple, i: int) -> Bracket:
     # The pair nearest to the real axis is the one that has just coalesced.
     centre = float(pairs[np.argmin(np.abs(pairs.imag))].real) if change[0] else 0.0
     friction = np.array([a.friction[i], b.friction[i]])
-    return Bracket(int(points[0].row[i]), friction, change, np.full(2, np.nan), centre)
+    return Bracket(int(a.row[i]), friction, change, np.full(2, np.nan), np.full(2, centre))

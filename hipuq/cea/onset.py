@@ -33,7 +33,7 @@ def boundaries(pencils: Pencils, lower: float, upper: float) -> list[list[Bounda
     pencils : Pencils
         s samples without damping; their own friction is not used.
     lower, upper : float
-        Range of friction, 0 <= lower < upper [1].
+        Range of friction, lower < upper [1].
 
     Returns
     -------
@@ -45,21 +45,32 @@ def boundaries(pencils: Pencils, lower: float, upper: float) -> list[list[Bounda
     InputError
         If the range does not ascend, is not finite, a sample is damped, or several pairs merge at once.
     """
-    if not (np.isfinite([lower, upper]).all() and 0 <= lower < upper):
-        raise InputError(f"the range of friction is {lower} to {upper}: it must ascend from 0 or above")
+    check_range(lower, upper)
     if pencils.damping is not None and pencils.damping.any():
         raise InputError("boundaries are found for undamped pencils only: damping must be zero")
-    sweep = Sweep(pencils, upper)
+    sweep = Sweep(pencils, max(abs(lower), abs(upper)))
     return proved(sweep, _brackets(sweep, lower, upper))
+
+
+def check_range(lower: float, upper: float) -> None:
+    """Raise an InputError unless a range of friction ascends between finite ends."""
+    if not (np.isfinite([lower, upper]).all() and lower < upper):
+        raise InputError(f"the range of friction is {lower} to {upper}: it must be finite and ascend")
+
+
+def start_grid(lower: float, upper: float) -> Array:
+    """Return the frictions at which pencils are looked at first: evenly, but by factors beyond 1."""
+    if upper <= 1 or lower >= 1:
+        return np.linspace(lower, upper, GRID)
+    return np.concatenate([np.linspace(lower, 1.0, GRID), np.geomspace(1.0, upper, GRID)[1:]])
 
 
 def _brackets(sweep: Sweep, lower: float, upper: float) -> list[Bracket]:
     """Return intervals of friction that hold one boundary each."""
     samples = len(sweep.constant)
-    points = sweep.points(
-        np.repeat(np.arange(samples), GRID), np.tile(np.linspace(lower, upper, GRID), samples)
-    )
-    index = np.arange(samples * GRID).reshape(samples, GRID)
+    grid = start_grid(lower, upper)
+    points = sweep.points(np.repeat(np.arange(samples), len(grid)), np.tile(grid, samples))
+    index = np.arange(samples * len(grid)).reshape(samples, -1)
     todo = np.stack([index[:, :-1].ravel(), index[:, 1:].ravel()])
     found: list[Bracket] = []
     while todo.size:

@@ -18,8 +18,9 @@ from hipuq.cea.structured import block_sizes, structured_eigenvalues
 from hipuq.cea.undamped import judge, judged_roots
 
 Rows = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 
-BLOCK = 128
+BLOCK = 512
 """Matrices whose eigenvalues are computed at once: they should stay in the cache."""
 
 
@@ -73,6 +74,8 @@ class Sweep:
     ----------
     pencils : Pencils
         s samples without damping; their own friction is not used.
+    largest : float
+        Largest modulus of friction that is looked at [1].
 
     Attributes
     ----------
@@ -84,11 +87,11 @@ class Sweep:
         Size of the eigenvalues [1/s^2].
     """
 
-    def __init__(self, pencils: Pencils, upper: float) -> None:
+    def __init__(self, pencils: Pencils, largest: float) -> None:
         self.constant, self.slope = pencils.reduced_parts()
         self.mechanisms = pencils.mechanisms
         self.filter_radius = pencils.filter_radius
-        self.norm = np.maximum(norms(self.constant), norms(self.slope) * upper)
+        self.norm = np.maximum(norms(self.constant), norms(self.slope) * largest)
         self.scale = self.norm / np.sqrt(self.constant.shape[1])
         self.sizes = block_sizes((self.constant != 0) + (self.slope != 0.0).astype(float))
 
@@ -124,15 +127,17 @@ class Sweep:
         sizes = self.sizes[row[unclear]]
         for size in np.unique(sizes):
             same = unclear[sizes == size]
-            part = matrices[same], mechanisms[same]
+            part = matrices[same]
             if size:
-                values[same] = structured_values(part[0], values[same], int(size), part[1])
+                values[same] = structured_values(part, values[same], int(size), mechanisms[same], known[same])
             else:
-                values[same] = judged_roots(*part, 0.0, AUTO, self.filter_radius).values
+                values[same] = judged_roots(part, mechanisms[same], 0.0, AUTO, self.filter_radius).values
         return values
 
 
-def structured_values(matrices: Array, start: Complex, size: int, mechanisms: Rows) -> Complex:
+def structured_values(
+    matrices: Array, start: Complex, size: int, mechanisms: Rows, known: Mask | None = None
+) -> Complex:
     """Return eigenvalues from the structured solver, real ones and pairs told apart as its bounds can.
 
     Parameters
@@ -143,6 +148,8 @@ def structured_values(matrices: Array, start: Complex, size: int, mechanisms: Ro
     size : int
         Block size.
     mechanisms : (s,) array of int
+    known : (s, n) array of bool, optional
+        Approximations that are good enough as they are.
 
     Returns
     -------
@@ -150,9 +157,8 @@ def structured_values(matrices: Array, start: Complex, size: int, mechanisms: Ro
     """
     rank = np.argsort(np.argsort(np.abs(start), axis=1, kind="stable"), axis=1)
     zero = (rank < mechanisms[:, None]) & (np.abs(start) <= ZERO * norms(matrices)[:, None])
-    values, radius = structured_eigenvalues(
-        matrices, np.where(zero, 0.0, start), size, fixed=zero, rough=True
-    )
+    fixed = zero if known is None else zero | known
+    values, radius = structured_eigenvalues(matrices, np.where(zero, 0.0, start), size, fixed, rough=True)
     found = np.isfinite(radius)
     values = np.where(found & (np.abs(values.imag) <= radius), values.real, values)
     return np.where(found.all(axis=1, keepdims=True), values, start)

@@ -23,6 +23,9 @@ MAXIMUM_STEPS = 60
 ROUGH_STEPS = 20
 """Steps after which a rough solution is left as it is."""
 
+ROUGH_TRACE = 1e-7
+"""Error of the sum of a rough solution, over the largest root, that does not speak against it."""
+
 ROUGH = 200
 """Correction, in units of the rounding of the largest root, with which a rough solution is content."""
 
@@ -73,8 +76,8 @@ def structured_eigenvalues(
     b : int
         Block size.
     fixed : (s, n) array of bool, optional
-        Approximations that are roots as they are and not to be moved, such as those of mechanisms: to
-        a multiple zero the iteration converges slowly. Their bound is 0.
+        Approximations that are roots as they are and not to be moved, such as those of mechanisms, to
+        which the iteration would converge slowly. Their bound is 0.
     rough : bool
         Be content with roots that still move after ROUGH_STEPS, as they do by about their accuracy
         where several nearly meet. Their bound, from the last step, is an estimate.
@@ -119,8 +122,16 @@ def structured_eigenvalues(
             )
             step[row, root] = np.where(moving[row, root], size, step[row, root])
             moving[row, root] &= ~settled
-        row, root = np.nonzero(np.ones_like(moving))
-        condition = _structured_condition(blocks.rows(row), values, row, root).reshape(values.shape)
+        # What a rough solution needs bounds for is whether roots near the axis are real.
+        near = (np.abs(values.imag) < 1e-6 * scale) & (np.abs(values.imag) > SAFETY * EPS * scale)
+        row, root = np.nonzero(near if rough else np.ones_like(moving))
+        condition = np.broadcast_to(scale, values.shape).copy()
+        if row.size:
+            found = _structured_condition(blocks.rows(row), values, row, root)
+            # A root of which no condition number can be had is as good as double.
+            condition[row, root] = (
+                np.nan_to_num(found, nan=1e-6 / EPS / SAFETY * scale[row, 0]) if rough else found
+            )
         radius = SAFETY * EPS * np.maximum(condition, scale)
         radius += 0.5 * n * step
     if fixed is not None:
@@ -128,6 +139,9 @@ def structured_eigenvalues(
     radius[~np.isfinite(radius) | (moving & (not rough))] = np.inf
     # Two approximations of one root would leave another root out, and the trace wrong.
     stray = np.abs(values.sum(axis=1) - np.trace(matrices, axis1=1, axis2=2))
+    if rough:
+        # Roots that were fixed are as good as they were given.
+        stray -= ROUGH_TRACE * scale[:, 0]
     radius[stray > radius.sum(axis=1)] = np.inf
     return _real_where_sure(values, radius), radius
 

@@ -3,12 +3,15 @@
 A figure is drawn on the Axes given as ``ax=`` (``axes=``, ``figure=`` where there are several), else
 on those of a new figure, which pyplot does not know: ``ax.figure.savefig(...)`` writes it.
 
-================================  ==========================================  =====================
+================================  ==========================================  ============================
 function                          shows                                       takes
-================================  ==========================================  =====================
+================================  ==========================================  ============================
 `occurrence`                      how often each mode is unstable, over the   stratified results of
                                   patterns of a number in contact             ``unstable``
 `occurrence_panels`               the same for every number in contact        the same
+`fragility`                       probability of instability over friction    results of `hipuq.fragility`
+`onset_distribution`              share of configurations with an onset,      outcomes with ``onset``
+                                  over friction
 `mode_shape`                      a mode of the ring, deformed                mode shapes of a ring
 `frequency_over_friction`         frequencies of modes, with lock-in          friction sweep
 `growth_over_friction`            growth rates of modes, with lock-in         friction sweep
@@ -16,13 +19,14 @@ function                          shows                                       ta
 `dispersion`                      real and imaginary parts of all modes       friction sweep
 `root_locus`                      growth rate over frequency                  friction sweep
 `damping_over_frequency`          damping ratio over frequency                friction sweep
-================================  ==========================================  =====================
+================================  ==========================================  ============================
 
 A friction sweep is ``evaluate(model, model.nominal(friction=np.linspace(0, 0.1, 1001)))``;
 `follow_modes` follows modes through one, `lock_in_bracket` reads off where a mode locks in.
 """
 
 from hipuq.plots.eigenvalue_plane import damping_over_frequency, root_locus
+from hipuq.plots.fragility_curves import fragility, onset_distribution
 from hipuq.plots.friction_sweep import dispersion, frequency_over_friction, growth_over_friction, lock_in
 from hipuq.plots.mode_shapes import mode_shape
 from hipuq.plots.occurrences import occurrence, occurrence_panels
@@ -31,6 +35,8 @@ from hipuq.plots.tracking import follow_modes, lock_in_bracket
 __all__ = [
     "occurrence",
     "occurrence_panels",
+    "fragility",
+    "onset_distribution",
     "mode_shape",
     "frequency_over_friction",
     "growth_over_friction",

@@ -26,6 +26,7 @@ def occurrence(
     results: xr.Dataset,
     count: int,
     *,
+    exact: xr.Dataset | None = None,
     ax: Axes | None = None,
     modes: Sequence[int] | None = None,
     names: Mapping[int, str] | None = None,
@@ -35,11 +36,15 @@ def occurrence(
     Parameters
     ----------
     results : Dataset
-        Of a stratified analysis of ``unstable``: ``probability_min``, ``_mean``, ``_max`` over
-        (count, mode), and if there are any the limits ``probability_mean_low``, ``_high``. Where all
-        patterns agree, as a single one does, the mean stands alone.
+        Of a stratified analysis of ``unstable`` or an exact one of ``probability_by_mode``:
+        ``probability_min``, ``_mean``, ``_max`` over (count, mode), and if there are any the limits
+        ``probability_mean_low``, ``_high``. Where all patterns agree, as a single one does, the mean
+        stands alone.
     count : int
         Number of oscillators in contact.
+    exact : Dataset, optional
+        Exact results of the same probabilities, with the same counts and modes: drawn beside the
+        sampled ones as bars, without their limits.
     ax : Axes, optional
         Where to draw; a new figure by default.
     modes : sequence of int, optional
@@ -57,24 +62,26 @@ def occurrence(
     SchemaError
         If the results are not of this kind.
     InputError
-        If the count or a mode is not in them.
+        If the count or a mode is not in them, or the exact ones have others.
     """
     chosen = _chosen(results, [count], modes)
+    beside = None if exact is None else _exact(exact, results, chosen)
     ax = new_axes(ax)
-    _draw(ax, chosen, count, names or {}, _mean_label(results))
+    _draw(ax, chosen, count, names or {}, _mean_label(results), beside)
     ax.set_title(_title(results, count))
     ax.set_xlabel(_mode_label(chosen, names))
     ax.set_ylabel(_probability_label(results))
     # Room for the legend above 100 %, where no data can be.
     ax.set_ylim(-4, 120)
     ax.set_yticks(range(0, 101, 20))
-    ax.legend(loc="upper center", ncols=3, fontsize="small")
+    ax.legend(loc="upper center", ncols=4, fontsize="small")
     return ax
 
 
 def occurrence_panels(
     results: xr.Dataset,
     *,
+    exact: xr.Dataset | None = None,
     figure: FigureBase | None = None,
     counts: Sequence[int] | None = None,
     modes: Sequence[int] | None = None,
@@ -85,6 +92,8 @@ def occurrence_panels(
     Parameters
     ----------
     results : Dataset
+        As for `occurrence`.
+    exact : Dataset, optional
         As for `occurrence`.
     figure : Figure or SubFigure, optional
         Where to draw; a new figure by default.
@@ -97,16 +106,22 @@ def occurrence_panels(
     -------
     (rows, 2) array of Axes
         One row and one column for a single count. A place left over is an Axes that is not visible.
+
+    Raises
+    ------
+    SchemaError, InputError
+        As for `occurrence`.
     """
     if counts is None:
         counts = [int(value) for value in _checked(results)["count"].values]
     chosen = _chosen(results, counts, modes)
+    beside = None if exact is None else _exact(exact, results, chosen)
     columns = min(2, len(counts))
     rows = -(-len(counts) // columns)
     size = (4.8 * columns, 2.9 * rows + 0.5)
     axes = new_panels(figure, rows, columns, size, sharex=True, sharey=True)
     for i, (ax, count) in enumerate(zip(axes.flat, counts, strict=False)):
-        _draw(ax, chosen, count, names or {}, _mean_label(results))
+        _draw(ax, chosen, count, names or {}, _mean_label(results), beside)
         ax.set_title(f"({chr(ord('a') + i)}) {_title(results, count)}")
     for ax in axes.flat[len(counts) :]:
         ax.set_visible(False)
@@ -119,7 +134,7 @@ def occurrence_panels(
         legend |= {
             label: handle for handle, label in zip(handles, labels, strict=True) if label not in legend
         }
-    parent.legend(legend.values(), legend.keys(), loc="outside upper center", ncols=3, frameon=False)
+    parent.legend(legend.values(), legend.keys(), loc="outside upper center", ncols=4, frameon=False)
     return axes
 
 
@@ -128,9 +143,20 @@ def _checked(results: xr.Dataset) -> xr.Dataset:
     for name in NEEDED:
         if name not in results or set(results[name].dims) != {"count", "mode"}:
             raise SchemaError(
-                f"the figure needs {name!r} over (count, mode): a stratified analysis of 'unstable'"
+                f"the figure needs {name!r} over (count, mode): a stratified analysis of 'unstable', or "
+                "an exact one of 'probability_by_mode'"
             )
     return results
+
+
+def _exact(exact: xr.Dataset, results: xr.Dataset, chosen: xr.Dataset) -> xr.Dataset:
+    """Return the exact results of the modes to draw, once they are known to be of the same kind."""
+    exact = _checked(exact)
+    for what in ("count", "mode"):
+        here, there = (sorted(data[what].values.tolist()) for data in (results, exact))
+        if here != there:
+            raise InputError(f"{what} of the exact results is {there}: it must be {here}, as of the sampled")
+    return exact.sel(mode=chosen["mode"].values)
 
 
 def _chosen(results: xr.Dataset, counts: Sequence[int], modes: Sequence[int] | None) -> xr.Dataset:
@@ -150,7 +176,14 @@ def _chosen(results: xr.Dataset, counts: Sequence[int], modes: Sequence[int] | N
     return results.sel(mode=wanted)
 
 
-def _draw(ax: Axes, chosen: xr.Dataset, count: int, names: Mapping[int, str], mean_label: str) -> None:
+def _draw(
+    ax: Axes,
+    chosen: xr.Dataset,
+    count: int,
+    names: Mapping[int, str],
+    mean_label: str,
+    exact: xr.Dataset | None,
+) -> None:
     """Draw one panel on places 0, 1, ... without its labels."""
     part = {key: 100 * chosen[key].sel(count=count).values for key in NEEDED}
     low, mean, high = part.values()
@@ -164,7 +197,9 @@ def _draw(ax: Axes, chosen: xr.Dataset, count: int, names: Mapping[int, str], me
     error = None
     if "probability_mean_low" in chosen and "probability_mean_high" in chosen:
         limits = [100 * chosen[f"probability_mean_{end}"].sel(count=count).values for end in ("low", "high")]
-        error = np.clip([mean - limits[0], limits[1] - mean], 0.0, None)
+        reach = np.clip([mean - limits[0], limits[1] - mean], 0.0, None)
+        # Exact means have limits too, which are themselves unless something is unknown.
+        error = reach if (reach != 0).any() else None
     ax.errorbar(
         place,
         mean,
@@ -177,6 +212,8 @@ def _draw(ax: Axes, chosen: xr.Dataset, count: int, names: Mapping[int, str], me
         elinewidth=2,
         label=mean_label if error is not None else "mean",
     )
+    if exact is not None:
+        _draw_exact(ax, exact.sel(count=count))
     unknown = np.isnan(mean)
     for x in place[unknown]:
         ax.annotate("?", (x, 0.02), xycoords=("data", "axes fraction"), ha="center", va="bottom")
@@ -185,6 +222,14 @@ def _draw(ax: Axes, chosen: xr.Dataset, count: int, names: Mapping[int, str], me
     ax.set_xlim(-0.6, len(place) - 0.4)
     ax.set_ylim(-4, 104)
     ax.grid(axis="y", linewidth=0.4, alpha=0.5)
+
+
+def _draw_exact(ax: Axes, part: xr.Dataset) -> None:
+    """Draw exact minimum, mean and maximum as bars, wider than the markers that they lie on."""
+    values = np.concatenate([100 * part[key].values for key in NEEDED])
+    place = np.tile(np.arange(part.sizes["mode"]), len(NEEDED))
+    bar: dict[str, Any] = {"marker": "_", "markersize": 17, "markeredgewidth": 1.1, "color": BLACK}
+    ax.plot(place, values, linestyle="none", zorder=3, label="exact", **bar)
 
 
 def _tick(chosen: xr.Dataset, place: int, names: Mapping[int, str]) -> str:
@@ -205,7 +250,9 @@ def _probability_label(results: xr.Dataset) -> str:
 
 
 def _mean_label(results: xr.Dataset) -> str:
-    """Return the legend of the mean: with the level of its interval where that is known."""
+    """Return the legend of a mean with limits: what they are, where that is known."""
+    if results.attrs.get("method") == "exact":
+        return "mean, limits of the unknown"
     level = results.attrs.get("confidence")
     return "mean" if level is None else f"mean, {100 * float(level):g} % interval"
 

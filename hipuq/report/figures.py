@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TypeGuard
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -48,24 +49,89 @@ def pictures(tree: xr.DataTree) -> Iterator[Picture]:
     """
     options = json.loads(tree.attrs.get("report", "{}"))
     names = {int(mode): name for mode, name in options.get("mode_names", {}).items()}
-    for analysis in analyses(tree):
-        groups = {str(key): node.to_dataset(inherit=False) for key, node in tree[analysis].children.items()}
-        if "probability_mean" in groups.get("unstable", {}):
-            yield _occurrence(analysis, groups["unstable"], names)
+    found = {
+        analysis: {str(key): node.to_dataset(inherit=False) for key, node in tree[analysis].children.items()}
+        for analysis in analyses(tree)
+    }
+    sampled = {
+        name: groups["unstable"] for name, groups in found.items() if _by_count(groups.get("unstable"))
+    }
+    exact = {name: _exact_of(results, found) for name, results in sampled.items()}
+    for analysis, groups in found.items():
+        if analysis in sampled:
+            other = exact[analysis]
+            beside = None if other is None else found[other]["probability_by_mode"]
+            yield _occurrence(analysis, sampled[analysis], names, other, beside)
+        elif _by_count(groups.get("probability_by_mode")) and analysis not in exact.values():
+            yield _occurrence(analysis, groups["probability_by_mode"], names)
         if "mode_shapes" in groups:
             yield _mode_shapes(analysis, groups["mode_shapes"], options, names)
         if "friction_sweep" in groups:
             yield from _sweep(analysis, groups["friction_sweep"], options)
 
 
-def _occurrence(analysis: str, results: xr.Dataset, names: dict[int, str]) -> Picture:
+def _by_count(results: xr.Dataset | None) -> TypeGuard[xr.Dataset]:
+    """Say whether there are results summed up by number in contact and mode."""
+    return (
+        results is not None
+        and "probability_mean" in results
+        and set(results["probability_mean"].dims) == {"count", "mode"}
+    )
+
+
+def _exact_of(sampled: xr.Dataset, found: Mapping[str, Mapping[str, xr.Dataset]]) -> str | None:
+    """Return the exact analysis of the probabilities that a sampled result estimates, if there is one."""
+    label = f"{sampled.attrs.get('model', '')}, friction integrated"
+    for analysis, groups in found.items():
+        exact = groups.get("probability_by_mode")
+        if (
+            _by_count(exact)
+            and exact.attrs.get("method") == "exact"
+            and str(exact.attrs.get("model", "")).startswith(label)
+            and _case(exact) == _case(sampled)
+            and all(set(exact[dim].values) == set(sampled[dim].values) for dim in ("count", "mode"))
+        ):
+            return analysis
+    return None
+
+
+def _case(results: xr.Dataset) -> tuple[object, ...]:
+    """Return the options of the model and the inputs, alike whether friction is sampled or integrated."""
+    inputs, options = (json.loads(results.attrs.get(key) or "{}") for key in ("inputs", "options"))
+    model = options.get("model")
+    if not isinstance(model, dict):
+        return inputs, model
+    sampled = inputs.pop("friction", {})
+    drawn = sampled.get("distribution") if sampled.get("how") == "absolute" else sampled
+    friction = model.pop("integrated", {}).get("friction", drawn)
+    # Neither the nominal friction nor who decides an open verdict changes the probability.
+    model.get("nominal", {}).pop("friction", None)
+    model.pop("certify", None)
+    return inputs, model, friction
+
+
+def _occurrence(
+    analysis: str,
+    results: xr.Dataset,
+    names: dict[int, str],
+    exact_analysis: str | None = None,
+    exact: xr.Dataset | None = None,
+) -> Picture:
     figure = Figure(figsize=(10, 7), layout="constrained")
-    plots.occurrence_panels(results, figure=figure, names=names or None)
+    plots.occurrence_panels(results, exact=exact, figure=figure, names=names or None)
     caption = (
         "Frequency of occurrence of instability by mode: minimum, mean and maximum over the contact "
-        "patterns of each number in contact. Samples without a known verdict are left out here and "
-        "counted in the limits of the table."
+        "patterns of each number in contact."
     )
+    if results.attrs.get("method") != "exact":
+        caption += (
+            " Samples without a known verdict are left out here and counted in the limits of the table."
+        )
+    if exact is not None:
+        caption += (
+            f" Bars: the same three without sampling, from the analysis {exact_analysis!r}, which "
+            "integrates friction exactly."
+        )
     return Picture(analysis, "occurrence", caption, figure)
 
 

@@ -1,0 +1,237 @@
+"""Friction integrated exactly: what is left to sample is smooth, and for some studies nothing is left.
+
+For fixed other parameters the unstable set of friction coefficients is a union of intervals, so with
+any distribution F of friction the probability of instability is the sum of F(end) - F(start): no
+sampling error. This is conditional Monte Carlo, or preintegration (Griewank, Kuo, Leovey, Sloan,
+J. Comput. Appl. Math. 344 (2018) 259).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from hipuq import schema
+from hipuq.cea.boundary import SIDE
+from hipuq.cea.bounds import CERTIFICATE, STRUCTURED
+from hipuq.cea.cells import Cells, stability_cells
+from hipuq.distributions import Distribution, as_distribution
+from hipuq.errors import InputError, check_name
+from hipuq.inputs import Inputs
+from hipuq.models.base import CEAModel
+
+Array = NDArray[np.float64]
+
+TAIL = 1e-9
+"""Probability that is cut off at an end of the support that is infinite."""
+
+FRICTION = "friction"
+
+
+def integrate_friction(model: CEAModel, distribution: object) -> FrictionIntegrated:
+    """Return the model with friction integrated over its distribution.
+
+    Parameters
+    ----------
+    model : CEAModel
+        A model built from matrices that has the parameter ``friction``.
+    distribution : object
+        Of the friction coefficient: a chaospy distribution, a frozen scipy one, or anything with
+        ``ppf`` and ``cdf``.
+
+    Returns
+    -------
+    FrictionIntegrated
+
+    Raises
+    ------
+    InputError
+        If the model is not of that kind, or the distribution has no ``cdf``.
+
+    Examples
+    --------
+    >>> import chaospy as cp
+    >>> import hipuq
+    >>> exact = hipuq.integrate_friction(hipuq.models.ring("oberst2016"), cp.Uniform(0.0, 0.1))
+    >>> outcomes = hipuq.evaluate(exact, exact.nominal())
+    >>> outcomes["probability"].values.round(10)
+    array([0.90502728])
+    """
+    if not isinstance(model, CEAModel) or FRICTION not in model.parameters:
+        raise InputError(
+            f"friction cannot be integrated for {model!r}: it takes a hipuq model built from matrices, "
+            "such as hipuq.models.ring(...), not integrated before"
+        )
+    found = as_distribution(distribution, "distribution of friction")
+    if found.cdf is None:
+        raise InputError(
+            f"the distribution of friction {found.source!r} has no cdf: friction is integrated by it"
+        )
+    return FrictionIntegrated(model, found)
+
+
+class FrictionIntegrated:
+    """A model without the parameter friction, made by `integrate_friction`.
+
+    The sweep covers the support of the distribution; an infinite end is cut where `TAIL` of the
+    probability is left, which goes into the bounds ``probability_low`` and ``probability_high``. A
+    boundary itself is stable, and so is an atom of the distribution within 1e-12 of it, relatively.
+
+    Attributes
+    ----------
+    model : CEAModel
+        The model with friction.
+    distribution : Distribution
+        Of the friction coefficient.
+    outcomes : tuple of str
+        Names of the outcomes that a call can give.
+    """
+
+    outcomes = (*schema.INTEGRATED, "status", "decided_by")
+    block = 128
+    """Samples that it takes at a time: each is worth hundreds."""
+
+    def __init__(self, model: CEAModel, distribution: Distribution) -> None:
+        self.model = model
+        self.distribution = distribution
+        self.parameters = {name: p for name, p in model.parameters.items() if name != FRICTION}
+        self.lower, self.upper = _range(distribution)
+
+    @property
+    def label(self) -> str:
+        """Name and preset, for attributes and titles."""
+        return f"{self.model.label}, friction integrated"
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The model as JSON-able options: what rebuilds it."""
+        return {**self.model.options, "integrated": {FRICTION: dict(self.distribution.description)}}
+
+    def inputs(self, **distributions: object) -> Inputs:
+        """Return inputs that know the model's nominal values, see `CEAModel.inputs`."""
+        self._refuse(distributions)
+        return self.model.inputs(**distributions)
+
+    def nominal(self, **changes: ArrayLike) -> xr.Dataset:
+        """Return one sample at the nominal values with changes, see `CEAModel.nominal`."""
+        self._refuse(changes)
+        return self.model.nominal(**changes)
+
+    def check(self, samples: xr.Dataset) -> None:
+        """Check all samples at once, see `CEAModel.check`."""
+        self._refuse(samples.variables)
+        self.model.check(samples)
+
+    def _refuse(self, names: Iterable[object]) -> None:
+        if FRICTION in names:
+            raise InputError(
+                "friction is integrated over its distribution: take it out of inputs and samples"
+            )
+
+    def __call__(self, samples: xr.Dataset, keep: Iterable[str] | None = None) -> xr.Dataset:
+        """Return the outcomes of the samples.
+
+        Parameters
+        ----------
+        samples : Dataset
+            Parameters over ``sample``, without friction.
+        keep : iterable of str, optional
+            Outcomes wanted; all by default. ``status`` and ``decided_by`` always come.
+
+        Returns
+        -------
+        Dataset
+            Over ``sample``, ``mode`` and ``interval``; see `hipuq.schema.INTEGRATED`. A probability is
+            that among the friction of known verdict, and NaN where part of the sweep is undecided.
+        """
+        self._refuse(samples.variables)
+        wanted = [
+            check_name("outcome", name, self.outcomes) for name in (self.outcomes if keep is None else keep)
+        ]
+        cells = stability_cells(
+            self.model.pencils(samples),
+            self.lower,
+            self.upper,
+            growth_threshold=self.model.growth_threshold,
+            by_mode="probability_by_mode" in wanted,
+        )
+        return self._outcomes(cells, wanted)
+
+    def _outcomes(self, cells: list[Cells], wanted: list[str]) -> xr.Dataset:
+        mass = [self._mass(one) for one in cells]
+        parts = {
+            "probability": [m @ (one.any_unstable == 1) for m, one in zip(mass, cells, strict=True)],
+            "unknown": [m @ np.isnan(one.any_unstable) for m, one in zip(mass, cells, strict=True)],
+            "covered": [m.sum() for m in mass],
+        }
+        unstable, unknown, covered = (np.array(part) for part in parts.values())
+        known = unknown == 0
+        by_mode = [m @ (one.unstable == 1) for m, one in zip(mass, cells, strict=True)]
+        modes = np.array([not np.isnan(one.unstable).any() for one in cells])
+        intervals = [one.intervals(one.any_unstable) for one in cells]
+        onsets = [_onset(one, known) for one, known in zip(cells, known, strict=True)]
+        longest = max((len(own) for own in intervals), default=0)
+        padded = np.full((len(cells), longest, 2), np.nan)
+        for row, own in zip(padded, intervals, strict=True):
+            row[: len(own)] = own
+        values = {
+            "probability": np.where(known, unstable / covered, np.nan),
+            "probability_low": unstable,
+            "probability_high": unstable + unknown + (1.0 - covered),
+            "probability_by_mode": np.where(modes[:, None], np.stack(by_mode) / covered[:, None], np.nan),
+            "onset": np.array(onsets),
+            "interval": padded,
+            "interval_count": np.where(known, [float(len(own)) for own in intervals], np.nan),
+        }
+        data: dict[str, Any] = {
+            name: (schema.INTEGRATED[name].dims, values[name], schema.INTEGRATED[name].attrs)
+            for name in wanted
+            if name in values
+        }
+        status = np.where(known, schema.STATUS["ok"], schema.STATUS["undecided"]).astype(np.int8)
+        data["status"] = ("sample", status, schema.flag_attrs("status of the sample", schema.STATUS))
+        proved = [CERTIFICATE if all(b.certified for b in one.boundaries) else STRUCTURED for one in cells]
+        decided = np.where(known, proved, -1).astype(np.int8)
+        attrs = schema.flag_attrs("what decided the boundaries", schema.DECIDED_BY)
+        data["decided_by"] = ("sample", decided, attrs)
+        coords = self.model.mode_coordinates() if "probability_by_mode" in wanted else {}
+        return xr.Dataset(data, coords=coords)
+
+    def _mass(self, cells: Cells) -> Array:
+        """Return the probability that friction is in each cell; a boundary goes to the stabler side."""
+        cdf = self.distribution.cdf
+        assert cdf is not None
+        inner = cells.edges[1:-1]
+        count = cells.unstable.sum(axis=1)
+        rises = count[1:] > count[:-1]
+        split = cdf(inner + np.where(rises, SIDE, -SIDE) * np.abs(inner)) if inner.size else inner
+        first = float(cdf(np.array([np.nextafter(self.lower, -np.inf)]))[0])
+        last = float(cdf(np.array([self.upper]))[0])
+        return np.diff(np.concatenate([[first], split, [last]]))
+
+
+def _onset(cells: Cells, known: bool) -> float:
+    """Return where the first unstable cell begins, infinity if none does, NaN behind an unknown one."""
+    verdict = cells.any_unstable
+    first = int(np.argmax(verdict == 1)) if (verdict == 1).any() else len(verdict)
+    if np.isnan(verdict[:first]).any():
+        return np.nan
+    return float(cells.edges[first]) if first < len(verdict) else np.inf
+
+
+def _range(distribution: Distribution) -> tuple[float, float]:
+    """Return the finite range that a sweep covers."""
+    lower, upper = distribution.support
+    if not np.isfinite(lower):
+        lower = float(distribution.ppf(np.array([TAIL]))[0])
+    if not np.isfinite(upper):
+        upper = float(distribution.ppf(np.array([1.0 - TAIL]))[0])
+    if not (np.isfinite([lower, upper]).all() and lower < upper):
+        raise InputError(
+            f"the distribution of friction reaches from {lower} to {upper}: nothing to integrate over"
+        )
+    return lower, upper
