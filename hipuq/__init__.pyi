@@ -7,8 +7,10 @@ from .driver import estimate as estimate
 from .driver import run as run
 from .errors import HipuqError as HipuqError
 from .evaluation import evaluate as evaluate
+from .friction import fragility as fragility
 from .friction import integrate_friction as integrate_friction
 from .inputs import Inputs as Inputs
+from .models.onset import unstable_friction as unstable_friction
 from .models.sensitivity import onset_sensitivity as onset_sensitivity
 from .store import load_outcomes as load_outcomes
 from .store import load_results as load_results

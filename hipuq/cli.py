@@ -86,6 +86,32 @@ def show(results: Annotated[Path, typer.Argument(help="Output folder or its resu
     show_results(load_results(results))
 
 
+@app.command()
+def onset(
+    model: Annotated[str, typer.Option("--model", help="Name of the model.")] = "ring",
+    preset: Annotated[str | None, typer.Option("--preset", help="Published set of values.")] = None,
+    contact: Annotated[
+        str | None, typer.Option("--contact", help="Oscillators in contact, such as 1,2,5; default all.")
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Parameter=value in place of the nominal one; may be repeated."),
+    ] = None,
+    growth_threshold: Annotated[
+        float, typer.Option("--growth-threshold", help="Growth rate above which a mode is unstable [1/s].")
+    ] = 0.0,
+    smallest: Annotated[float, typer.Option("--min", help="Smallest friction.")] = 0.0,
+    largest: Annotated[float, typer.Option("--max", help="Largest friction.")] = 0.1,
+) -> None:
+    """Print the unstable friction intervals of one configuration, each boundary certified."""
+    from hipuq.configuration import configured
+    from hipuq.models import unstable_friction
+    from hipuq.report.configuration import show_onset
+
+    chosen, sample = configured(model, preset, contact, settings or [], growth_threshold)
+    show_onset(unstable_friction(chosen, sample, lower=smallest, upper=largest))
+
+
 @app.command("list")
 def list_(what: Annotated[str, typer.Argument(help="models or methods")]) -> None:
     """List models with their presets, or methods with their options."""

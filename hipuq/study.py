@@ -16,9 +16,11 @@ import numpy as np
 import xarray as xr
 
 from hipuq import __version__, schema
+from hipuq.contact import ContactPatterns
 from hipuq.driver import method_named
 from hipuq.errors import HipuqError, InputError, StoreError, StudyError, check_name
 from hipuq.evaluation import evaluate
+from hipuq.friction import FrictionIntegrated, integrate_friction
 from hipuq.inputs import Inputs
 from hipuq.methods import Method
 from hipuq.models import MODELS, CEAModel
@@ -26,6 +28,7 @@ from hipuq.models.oscillator_ring import OscillatorRing
 from hipuq.sampling import seed_of
 from hipuq.store import RESULTS_NAME, load_results, save_outcomes, save_results
 from hipuq.study_file import ReportTable, StudyFile, read_study_file
+from hipuq.variation import Variation
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,7 @@ class Analysis:
     ----------
     name : str
         Name of its group in the results.
-    model : CEAModel
+    model : CEAModel or FrictionIntegrated
         The model with the analysis' preset and options.
     inputs : Inputs
         The uncertain parameters.
@@ -53,7 +56,7 @@ class Analysis:
     """
 
     name: str
-    model: CEAModel
+    model: CEAModel | FrictionIntegrated
     inputs: Inputs
     method: str
     n: int
@@ -180,7 +183,7 @@ def run_study(
         seed = seed_of(np.random.SeedSequence(study.seed, spawn_key=(i,)))
         method = method_named(analysis.method)
         samples = method.design(analysis.inputs, analysis.n, seed, **analysis.design_options)
-        outcomes = evaluate(analysis.model, samples, keep=analysis.of, n_jobs=n_jobs, progress=progress)
+        outcomes = evaluate(analysis.model, samples, keep=_kept(analysis), n_jobs=n_jobs, progress=progress)
         save_outcomes(outcomes, folder / "outcomes" / f"{analysis.name}.zarr")
         for of in analysis.of:
             groups[f"{analysis.name}/{of}"] = method.estimate(
@@ -196,10 +199,18 @@ def run_study(
     return xr.DataTree.from_dict(groups)
 
 
+def _kept(analysis: Analysis) -> list[str]:
+    """Return the outcomes that an analysis needs: those asked for, and the bounds that they have."""
+    bounds = [f"{of}_{end}" for of in analysis.of for end in ("low", "high")]
+    return [*analysis.of, *(name for name in bounds if name in analysis.model.outcomes)]
+
+
 def _at_nominal(analysis: Analysis, report: ReportTable, n_jobs: int | None) -> dict[str, xr.Dataset]:
     """Return the friction sweep and the mode shapes at nominal values that the report shows."""
-    groups = {}
+    groups: dict[str, xr.Dataset] = {}
     model = analysis.model
+    if not isinstance(model, CEAModel):
+        return groups
     if report.friction_sweep is not None:
         grid = np.linspace(*report.friction_sweep, report.friction_points)
         sweep = evaluate(model, model.nominal(friction=grid), n_jobs=n_jobs, progress=False)
@@ -230,19 +241,32 @@ def _check_writable(folder: Path) -> None:
 def _analysis(table: StudyFile, name: str) -> Analysis:
     """Return one analysis with what it overrides."""
     entry = next(entry for entry in table.analysis if entry.name == name)
-    model = _model({**table.model, **({"preset": entry.preset} if entry.preset else {}), **entry.model})
-    inputs = model.inputs(
-        **{key: value.distribution_for(key) for key, value in {**table.inputs, **entry.inputs}.items()}
-    )
+    base = _model({**table.model, **({"preset": entry.preset} if entry.preset else {}), **entry.model})
+    given = {key: value.distribution_for(key) for key, value in {**table.inputs, **entry.inputs}.items()}
+    model = base if not entry.integrate_friction else _integrated(base, given)
+    inputs = model.inputs(**given)
     method: Method = method_named(entry.method)
+    n = entry.n
+    if n is None:
+        if method.sized:
+            raise InputError(f"n is missing: the method {entry.method!r} needs the size of its design")
+        n = 1
     designing, estimating = method.split(entry.options)
     for of in entry.of:
         check_name("outcome in of", of, model.outcomes)
-    evaluations = method.evaluations(inputs, entry.n, **designing)
-    _check_report(table.report, model)
-    return Analysis(
-        name, model, inputs, entry.method, entry.n, tuple(entry.of), designing, estimating, evaluations
-    )
+    evaluations = method.evaluations(inputs, n, **designing)
+    _check_report(table.report, base)
+    return Analysis(name, model, inputs, entry.method, n, tuple(entry.of), designing, estimating, evaluations)
+
+
+def _integrated(model: CEAModel, inputs: dict[str, object]) -> FrictionIntegrated:
+    """Return the model with friction integrated over its distribution, which is taken out of the inputs."""
+    if "friction" not in inputs:
+        raise InputError("integrate_friction needs the distribution [inputs.friction]")
+    friction = inputs.pop("friction")
+    if isinstance(friction, (ContactPatterns, Variation)):
+        raise InputError("integrate_friction needs a distribution of friction itself, apply = 'absolute'")
+    return integrate_friction(model, friction)
 
 
 def _check_report(report: ReportTable, model: CEAModel) -> None:

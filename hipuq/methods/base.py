@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hipuq import schema
 from hipuq.errors import InputError, check_name
 from hipuq.inputs import Inputs
-from hipuq.methods.intervals import check_confidence
+from hipuq.intervals import check_confidence
 from hipuq.sampling import BLOCK
 
 Array = NDArray[np.float64]
@@ -36,6 +36,8 @@ class Method:
         ``(inputs, n, **options of design) -> int``.
     refine : callable or None
         ``(outcomes, inputs, rng, **options) -> samples or None``, of a sequential method.
+    sized : bool
+        Whether the size n of a design has to be chosen; if not it is 1.
     """
 
     title: str
@@ -43,6 +45,7 @@ class Method:
     estimate: Callable[..., xr.Dataset]
     evaluations: Callable[..., int]
     refine: Callable[..., xr.Dataset | None] | None = None
+    sized: bool = True
 
     def options(self, stage: str) -> dict[str, Any]:
         """Return the options of ``"design"`` or ``"estimate"`` with their defaults."""

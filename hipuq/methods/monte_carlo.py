@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from hipuq import schema
 from hipuq.errors import InputError, check_name
 from hipuq.inputs import Inputs
+from hipuq.intervals import check_confidence, student, wilson
 from hipuq.methods.base import rows_of, samples_by_block
-from hipuq.methods.intervals import check_confidence, student, wilson
 from hipuq.methods.reduction import Moments, moments
 from hipuq.methods.results import Kind, finished, kind_of, labelled, levels_of, with_summaries
 from hipuq.sampling import SAMPLERS, Seed, check_count, check_size, seed_of, unit_points

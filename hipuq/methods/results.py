@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hipuq import schema
 from hipuq.errors import SchemaError
 from hipuq.inputs import Inputs
-from hipuq.methods.intervals import combined
+from hipuq.intervals import combined
 
 ENDS = {"": "", "_low": ", lower limit", "_high": ", upper limit"}
 """Ends of the names of an estimate and its limits -> what they add to its long_name."""
@@ -105,7 +105,9 @@ def labelled(values: xr.DataArray, kind: Kind, arrays: Mapping[str, xr.DataArray
     """
     name = str(values.attrs.get("long_name", values.name))
     units = "1" if kind.bounded else str(values.attrs.get("units", ""))
-    what = f"probability: {name}" if kind.bounded else f"mean of {name}"
+    what = f"mean of {name}"
+    if kind.bounded:
+        what = name if name.startswith("probability") else f"probability: {name}"
     results = xr.Dataset()
     for key, (end, text) in zip(("estimate", "low", "high"), ENDS.items(), strict=True):
         results[kind.quantity + end] = arrays[key].assign_attrs(long_name=what + text, units=units)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from hipuq.models import mode_coupling, oscillator_ring
 from hipuq.models.base import CEAModel
 from hipuq.models.mode_coupling import two_dof
+from hipuq.models.onset import unstable_friction
 from hipuq.models.oscillator_ring import ring
 from hipuq.models.parameter import Parameter
 from hipuq.models.sensitivity import onset_sensitivity
@@ -25,4 +26,13 @@ PRESETS: dict[str, list[str]] = {
 }
 """Name of a model -> its presets."""
 
-__all__ = ["MODELS", "PRESETS", "CEAModel", "Parameter", "onset_sensitivity", "ring", "two_dof"]
+__all__ = [
+    "MODELS",
+    "PRESETS",
+    "CEAModel",
+    "Parameter",
+    "onset_sensitivity",
+    "ring",
+    "two_dof",
+    "unstable_friction",
+]

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeGuard
 
 import xarray as xr
 from matplotlib.figure import Figure
 
 from hipuq import plots
-from hipuq.report.summary import analyses
+from hipuq.report.partners import exact_of, groups_of, summed_up
 
 
 @dataclass(frozen=True)
@@ -49,65 +48,25 @@ def pictures(tree: xr.DataTree) -> Iterator[Picture]:
     """
     options = json.loads(tree.attrs.get("report", "{}"))
     names = {int(mode): name for mode, name in options.get("mode_names", {}).items()}
-    found = {
-        analysis: {str(key): node.to_dataset(inherit=False) for key, node in tree[analysis].children.items()}
-        for analysis in analyses(tree)
-    }
+    found = groups_of(tree)
+    by_mode = {"count", "mode"}
     sampled = {
-        name: groups["unstable"] for name, groups in found.items() if _by_count(groups.get("unstable"))
+        name: groups["unstable"]
+        for name, groups in found.items()
+        if summed_up(groups.get("unstable"), by_mode)
     }
-    exact = {name: _exact_of(results, found) for name, results in sampled.items()}
+    exact = {name: exact_of(results, found) for name, results in sampled.items()}
     for analysis, groups in found.items():
         if analysis in sampled:
             other = exact[analysis]
             beside = None if other is None else found[other]["probability_by_mode"]
             yield _occurrence(analysis, sampled[analysis], names, other, beside)
-        elif _by_count(groups.get("probability_by_mode")) and analysis not in exact.values():
+        elif summed_up(groups.get("probability_by_mode"), by_mode) and analysis not in exact.values():
             yield _occurrence(analysis, groups["probability_by_mode"], names)
         if "mode_shapes" in groups:
             yield _mode_shapes(analysis, groups["mode_shapes"], options, names)
         if "friction_sweep" in groups:
             yield from _sweep(analysis, groups["friction_sweep"], options)
-
-
-def _by_count(results: xr.Dataset | None) -> TypeGuard[xr.Dataset]:
-    """Say whether there are results summed up by number in contact and mode."""
-    return (
-        results is not None
-        and "probability_mean" in results
-        and set(results["probability_mean"].dims) == {"count", "mode"}
-    )
-
-
-def _exact_of(sampled: xr.Dataset, found: Mapping[str, Mapping[str, xr.Dataset]]) -> str | None:
-    """Return the exact analysis of the probabilities that a sampled result estimates, if there is one."""
-    label = f"{sampled.attrs.get('model', '')}, friction integrated"
-    for analysis, groups in found.items():
-        exact = groups.get("probability_by_mode")
-        if (
-            _by_count(exact)
-            and exact.attrs.get("method") == "exact"
-            and str(exact.attrs.get("model", "")).startswith(label)
-            and _case(exact) == _case(sampled)
-            and all(set(exact[dim].values) == set(sampled[dim].values) for dim in ("count", "mode"))
-        ):
-            return analysis
-    return None
-
-
-def _case(results: xr.Dataset) -> tuple[object, ...]:
-    """Return the options of the model and the inputs, alike whether friction is sampled or integrated."""
-    inputs, options = (json.loads(results.attrs.get(key) or "{}") for key in ("inputs", "options"))
-    model = options.get("model")
-    if not isinstance(model, dict):
-        return inputs, model
-    sampled = inputs.pop("friction", {})
-    drawn = sampled.get("distribution") if sampled.get("how") == "absolute" else sampled
-    friction = model.pop("integrated", {}).get("friction", drawn)
-    # Neither the nominal friction nor who decides an open verdict changes the probability.
-    model.get("nominal", {}).pop("friction", None)
-    model.pop("certify", None)
-    return inputs, model, friction
 
 
 def _occurrence(

@@ -13,7 +13,8 @@ import xarray as xr
 
 from hipuq.errors import StoreError
 from hipuq.report.figures import pictures
-from hipuq.report.summary import analyses, estimates, headline, inputs_table, tables, trust
+from hipuq.report.partners import comparison, groups_of
+from hipuq.report.summary import bounded, estimates, headline, inputs_table, is_exact, tables, trust
 
 RESOLUTION = 130
 """Dots per inch of the pictures."""
@@ -81,7 +82,8 @@ def content(tree: xr.DataTree, images: dict[str, list[dict[str, str]]]) -> dict[
     """
     names = json.loads(tree.attrs.get("report", "{}")).get("mode_names", {})
     sections = []
-    for analysis in analyses(tree):
+    groups = groups_of(tree)
+    for analysis in groups:
         found = dict(estimates(tree, analysis))
         if not found:
             continue
@@ -95,6 +97,9 @@ def content(tree: xr.DataTree, images: dict[str, list[dict[str, str]]]) -> dict[
                 "inputs": inputs_table(first),
                 "tables": [table for results in found.values() for table in tables(results, names)],
                 "images": images.get(analysis, []),
+                "exact": is_exact(first),
+                "bounded": any(bounded(results, "probability") for results in found.values()),
+                "comparison": comparison(analysis, groups),
                 "confidence": f"{first.attrs['confidence']:.0%}",
             }
         )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,6 +17,8 @@ from hipuq.errors import SchemaError
 MISSING = "n/a"
 """What stands for a number that does not exist."""
 
+SAME = 1e-12
+"""Bounds of exact results that are this close to the value say no more than the value."""
 
 STUDY_ATTRS = ("title", "description", "study", "seed", "report", "study_file", "hipuq_version")
 """Attributes that the results of a study have."""
@@ -64,16 +68,32 @@ def number(value: float, digits: int = 4) -> str:
     return MISSING if np.isnan(value) else f"{value:.{digits}g}"
 
 
-def share(value: float) -> str:
-    """Return a probability as text with four decimals."""
-    return MISSING if np.isnan(value) else f"{value:.4f}"
+def share(value: float, digits: int = 4) -> str:
+    """Return a probability as text with fixed decimals."""
+    return MISSING if np.isnan(value) else f"{value:.{digits}f}"
+
+
+def is_exact(results: xr.Dataset) -> bool:
+    """Say whether results have no sampling error."""
+    return results.attrs.get("method") == "exact"
+
+
+def bounded(results: xr.Dataset, key: str) -> bool:
+    """Say whether limits tell more than the value: always if sampled, else only where part is unknown."""
+    if not is_exact(results):
+        return True
+    value = results[key].values
+    ends = np.array([np.abs(results[f"{key}_{end}"].values - value) for end in ("low", "high")])
+    return not bool((ends <= SAME).all())
 
 
 def interval(results: xr.Dataset, key: str) -> str:
-    """Return estimate and interval of a scalar, such as ``0.4533 (0.4431 to 0.4636)``."""
-    text = share if key.startswith("probability") else number
+    """Return estimate and limits of a scalar, such as ``0.4533 (0.4431 to 0.4636)``."""
+    text = _text(results, key, 8)
     middle, low, high = (text(float(results[key + end])) for end in ("", "_low", "_high"))
-    return f"{middle} ({low} to {high})"
+    if not bounded(results, key):
+        return middle
+    return f"{middle} ({'bounds ' if is_exact(results) else ''}{low} to {high})"
 
 
 def headline(results: xr.Dataset) -> str:
@@ -123,30 +143,34 @@ def tables(results: xr.Dataset, mode_names: dict[str, str] | None = None) -> lis
 
 def _by_group(results: xr.Dataset, quantity: str) -> Table:
     """Return a row for each group of levels."""
-    text = _text(quantity)
+    text = _text(results, quantity, 8)
     group = str(results[f"{quantity}_mean"].dims[0])
+    limits = bounded(results, f"{quantity}_mean")
+    weighted = not _equal(results[f"{quantity}_weighted"], results[f"{quantity}_mean"])
     rows = []
     for value, size in _groups(results, group):
         part = results.sel({group: value})
         ends = ("mean", "mean_low", "mean_high", "min", "max", "weighted")
-        mean, low, high, least, most, weighted = (text(float(part[f"{quantity}_{end}"])) for end in ends)
-        rows.append([str(value), str(size), mean, f"{low} to {high}", least, most, weighted])
-    heading = str(results[group].attrs.get("long_name", group))
-    columns = [heading, "levels", "mean", "interval", "minimum", "maximum", "weighted mean"]
+        mean, low, high, least, most, by_weight = (text(float(part[f"{quantity}_{end}"])) for end in ends)
+        between = [f"{low} to {high}"] if limits else []
+        rows.append([str(value), str(size), mean, *between, least, most, *([by_weight] if weighted else [])])
+    columns = [_heading(results, group), "levels", "mean", *([_limits(results)] if limits else [])]
+    columns += ["minimum", "maximum", *(["weighted mean"] if weighted else [])]
     return Table(f"{_title(results, quantity)}; over the levels of each group", columns, rows)
 
 
 def _by_mode_and_group(results: xr.Dataset, quantity: str, names: dict[str, str] | None) -> list[Table]:
-    """Return mean, range and the interval of the mean, a row for each mode."""
-    text = _text(quantity)
+    """Return mean, range and the limits of the mean, a row for each mode."""
+    text = _text(results, quantity, 6)
     group = next(str(dim) for dim in results[f"{quantity}_mean"].dims if dim != "mode")
     groups = _groups(results, group)
-    heading = str(results[group].attrs.get("long_name", group))
     forms = {
         "mean": ("{0}", ("mean",)),
         "minimum to maximum": ("{0} to {1}", ("min", "max")),
-        "interval of the mean": ("{0} to {1}", ("mean_low", "mean_high")),
+        f"{_limits(results)} of the mean": ("{0} to {1}", ("mean_low", "mean_high")),
     }
+    if not bounded(results, f"{quantity}_mean"):
+        forms.popitem()
     made = []
     for title, (form, ends) in forms.items():
         rows = []
@@ -157,10 +181,8 @@ def _by_mode_and_group(results: xr.Dataset, quantity: str, names: dict[str, str]
                 for value, _ in groups
             ]
             rows.append([mode_label(results, mode, names), *cells])
-        columns = [
-            "mode",
-            *(f"{value} {heading.removeprefix('oscillators ')}" for value, _ in groups),
-        ]
+        heading = _heading(results, group).removeprefix("oscillators ")
+        columns = ["mode", *(f"{value} {heading}" for value, _ in groups)]
         made.append(
             Table(f"{_title(results, quantity)}; {title} over the levels of each group", columns, rows)
         )
@@ -169,15 +191,28 @@ def _by_mode_and_group(results: xr.Dataset, quantity: str, names: dict[str, str]
 
 def _by_mode(results: xr.Dataset, quantity: str, names: dict[str, str] | None) -> Table:
     """Return a row for each mode."""
-    text = _text(quantity)
+    text = _text(results, quantity, 6)
+    ends = {"": quantity, "_low": "low", "_high": "high"} if bounded(results, quantity) else {"": quantity}
     rows = [
         [
             mode_label(results, mode, names),
-            *(text(float(results[quantity + end].sel(mode=mode))) for end in ("", "_low", "_high")),
+            *(text(float(results[quantity + end].sel(mode=mode))) for end in ends),
         ]
         for mode in _modes_shown(results, quantity)
     ]
-    return Table(f"{_title(results, quantity)} by mode", ["mode", quantity, "low", "high"], rows)
+    return Table(f"{_title(results, quantity)} by mode", ["mode", *ends.values()], rows)
+
+
+def _limits(results: xr.Dataset) -> str:
+    return "bounds" if is_exact(results) else "interval"
+
+
+def _heading(results: xr.Dataset, group: str) -> str:
+    return str(results[group].attrs.get("long_name", group))
+
+
+def _equal(one: xr.DataArray, other: xr.DataArray) -> bool:
+    return bool(np.allclose(one.values, other.values, rtol=SAME, atol=SAME, equal_nan=True))
 
 
 def _groups(results: xr.Dataset, group: str) -> list[tuple[int, int]]:
@@ -186,8 +221,11 @@ def _groups(results: xr.Dataset, group: str) -> list[tuple[int, int]]:
     return [(int(value), int((results[coord] == value).sum())) for value in results[group].values]
 
 
-def _text(quantity: str) -> Callable[[float], str]:
-    return share if quantity == "probability" else number
+def _text(results: xr.Dataset, quantity: str, digits: int) -> Callable[[float], str]:
+    """Return what writes a value: a probability with so many decimals if exact, with four if sampled."""
+    if not quantity.startswith("probability"):
+        return number
+    return partial(share, digits=digits if is_exact(results) else 4)
 
 
 def mode_label(results: xr.Dataset, mode: int, names: dict[str, str] | None = None) -> str:
@@ -199,28 +237,39 @@ def mode_label(results: xr.Dataset, mode: int, names: dict[str, str] | None = No
 
 
 def inputs_table(results: xr.Dataset) -> Table:
-    """Return the uncertain inputs of a result as a table."""
+    """Return the uncertain inputs of a result as a table, with those integrated out of the model."""
     rows = []
     for name, entry in json.loads(results.attrs["inputs"]).items():
-        known = schema.PARAMETERS.get(name)
-        unit = known.units if known else ""
-        meaning = known.long_name if known else name
         if entry["how"] == "contact_patterns":
             counts = ", ".join(map(str, entry["in_contact"]))
             weights = "given weights" if "weights" in entry else "each number equally likely"
             drawn = f"all choices of {counts} of {entry['oscillators']}, {weights}"
-            how = "pattern"
+            how = "every pattern once" if is_exact(results) else "pattern"
         else:
-            source = entry["distribution"]
-            arguments = [*map(str, source.get("args", ()))]
-            arguments += [f"{key}={value}" for key, value in source.get("kwargs", {}).items()]
-            drawn = source.get("text") or f"{source['name']}({', '.join(arguments)})"
+            drawn = _distribution(entry["distribution"])
             how = {"absolute": "value", "relative": "nominal * (1 + draw)", "shift": "nominal + draw"}[
                 entry["how"]
             ]
             how += f", one draw for each {entry['dims'][0]}" if entry["each"] else ""
-        rows.append([name, meaning, unit, how, drawn])
+        rows.append([name, *_meaning(name), how, drawn])
+    model = json.loads(results.attrs["options"]).get("model")
+    integrated = model.get("integrated", {}) if isinstance(model, dict) else {}
+    for name, source in integrated.items():
+        rows.insert(0, [name, *_meaning(name), "integrated, not sampled", _distribution(source)])
     return Table("Uncertain inputs", ["parameter", "meaning", "unit", "applied as", "distribution"], rows)
+
+
+def _meaning(name: str) -> tuple[str, str]:
+    """Return what a parameter means, and its unit."""
+    known = schema.PARAMETERS.get(name)
+    return (known.long_name, known.units) if known else (name, "")
+
+
+def _distribution(source: Mapping[str, Any]) -> str:
+    """Return a distribution as text, such as ``Uniform(lower=0.0, upper=0.1)``."""
+    arguments = [*map(str, source.get("args", ()))]
+    arguments += [f"{key}={value}" for key, value in source.get("kwargs", {}).items()]
+    return source.get("text") or f"{source['name']}({', '.join(arguments)})"
 
 
 def _title(results: xr.Dataset, quantity: str) -> str:

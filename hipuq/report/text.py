@@ -10,7 +10,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table as RichTable
 
-from hipuq.report.summary import Table, analyses, estimates, headline, tables, trust
+from hipuq.report.partners import comparison, groups_of
+from hipuq.report.summary import Table, estimates, headline, is_exact, tables, trust
 
 
 def show_results(tree: xr.DataTree, console: Console | None = None) -> None:
@@ -23,27 +24,32 @@ def show_results(tree: xr.DataTree, console: Console | None = None) -> None:
     console : rich Console, optional
         Where to print; by default standard output.
     """
-    screen = Console(highlight=False, soft_wrap=not _is_wide()) if console is None else console
+    screen = screen_for(console)
     screen.print(f"[bold]{escape(str(tree.attrs.get('title', 'hipuq results')))}[/bold]")
     names = json.loads(tree.attrs.get("report", "{}")).get("mode_names", {})
-    for analysis in analyses(tree):
+    found = groups_of(tree)
+    for analysis in found:
         for i, (_, results) in enumerate(estimates(tree, analysis)):
             if i == 0:
-                line = f"{results.attrs['model']}, {results.attrs['method']}, seed {results.attrs['seed']}"
+                line = f"{results.attrs['model']}, {results.attrs['method']}"
+                line += "" if is_exact(results) else f", seed {results.attrs['seed']}"
                 screen.print(f"\n[bold]{escape(analysis)}[/bold]: {escape(line)}")
                 screen.print(trust(results))
             if "mode" not in results.dims:
                 screen.print(escape(headline(results)))
             for table in tables(results, names)[:1]:
-                screen.print(_rich(table))
+                screen.print(printed(table))
+        if line := comparison(analysis, found):
+            screen.print(escape(line))
 
 
-def _is_wide() -> bool:
-    """Say whether tables fit; in a pipe lines must not be folded."""
-    return Console().is_terminal
+def screen_for(console: Console | None) -> Console:
+    """Return the console, or standard output; in a pipe lines must not be folded."""
+    return Console(highlight=False, soft_wrap=not Console().is_terminal) if console is None else console
 
 
-def _rich(table: Table) -> RichTable:
+def printed(table: Table) -> RichTable:
+    """Return a table as it is printed."""
     made = RichTable(title=escape(table.title), title_justify="left", title_style="none", box=None)
     for i, column in enumerate(table.columns):
         heading = "\n".join(textwrap.wrap(column, 10, break_long_words=False))

@@ -1,0 +1,114 @@
+"""Sampled results and the exact ones of the same probabilities."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TypeGuard
+
+import numpy as np
+import xarray as xr
+
+from hipuq.report.summary import analyses
+
+Found = Mapping[str, Mapping[str, xr.Dataset]]
+"""Analysis -> name of a group -> its Dataset."""
+
+EXACT = {"any_unstable": "probability", "unstable": "probability_by_mode"}
+"""Outcome that is sampled -> the one that gives its probability with friction integrated."""
+
+
+def groups_of(tree: xr.DataTree) -> dict[str, dict[str, xr.Dataset]]:
+    """Return the Datasets of a results tree, by analysis and name."""
+    return {
+        analysis: {str(key): node.to_dataset(inherit=False) for key, node in tree[analysis].children.items()}
+        for analysis in analyses(tree)
+    }
+
+
+def summed_up(results: xr.Dataset | None, dims: set[str]) -> TypeGuard[xr.Dataset]:
+    """Say whether there are results with mean probabilities over these dims."""
+    return (
+        results is not None
+        and "probability_mean" in results
+        and set(results["probability_mean"].dims) == dims
+    )
+
+
+def exact_of(sampled: xr.Dataset, found: Found) -> str | None:
+    """Return the exact analysis of the probabilities that a sampled result estimates, if there is one.
+
+    Parameters
+    ----------
+    sampled : Dataset
+        Results summed up by group of levels.
+    found : mapping
+        All results.
+
+    Returns
+    -------
+    str or None
+        Name of the analysis: same model, inputs and friction, integrated there.
+    """
+    label = f"{sampled.attrs.get('model', '')}, friction integrated"
+    dims = {str(dim) for dim in sampled["probability_mean"].dims}
+    for analysis, groups in found.items():
+        exact = groups.get(EXACT.get(str(sampled.attrs.get("of")), ""))
+        if (
+            summed_up(exact, dims)
+            and exact.attrs.get("method") == "exact"
+            and str(exact.attrs.get("model", "")).startswith(label)
+            and _case(exact) == _case(sampled)
+            and all(set(exact[dim].values) == set(sampled[dim].values) for dim in dims)
+        ):
+            return analysis
+    return None
+
+
+def _case(results: xr.Dataset) -> tuple[object, ...]:
+    """Return the options of the model and the inputs, alike whether friction is sampled or integrated."""
+    inputs, options = (json.loads(results.attrs.get(key) or "{}") for key in ("inputs", "options"))
+    model = options.get("model")
+    if not isinstance(model, dict):
+        return inputs, model
+    sampled = inputs.pop("friction", {})
+    drawn = sampled.get("distribution") if sampled.get("how") == "absolute" else sampled
+    friction = model.pop("integrated", {}).get("friction", drawn)
+    # Neither the nominal friction nor who decides an open verdict changes the probability.
+    model.get("nominal", {}).pop("friction", None)
+    model.pop("certify", None)
+    return inputs, model, friction
+
+
+def comparison(analysis: str, found: Found) -> str:
+    """Return in one line how many intervals of a sampled analysis hold the exact value; empty without one.
+
+    Intervals are those of the mean over a group of levels. Where a mode is never unstable, exactly and
+    in the samples, there is nothing to compare.
+    """
+    told: dict[str, list[str]] = {}
+    levels = set()
+    whole = [one for one in found[analysis].values() if "probability_mean" in one]
+    for sampled in sorted(whole, key=lambda one: one["probability_mean"].ndim):
+        other = exact_of(sampled, found)
+        if other is None:
+            continue
+        exact = found[other][EXACT[str(sampled.attrs["of"])]]
+        held, count = _held(sampled, exact)
+        by = "group and mode" if "mode" in sampled["probability_mean"].dims else "group"
+        told.setdefault(other, []).append(f"{held} of {count} by {by}")
+        levels.add(f"{sampled.attrs['confidence']:.0%}")
+    return "; ".join(
+        f"{' or '.join(sorted(levels))} intervals that hold the exact value ({other}): {', '.join(parts)}"
+        for other, parts in told.items()
+    )
+
+
+def _held(sampled: xr.Dataset, exact: xr.Dataset) -> tuple[int, int]:
+    """Return how many intervals hold the exact value, and how many there are to compare."""
+    own = sampled[[f"probability_mean{end}" for end in ("", "_low", "_high")]]
+    value, own = xr.align(exact["probability_mean"], own, join="inner")
+    middle, low, high = (own[name].transpose(*value.dims).values for name in own)
+    asked = ((value.values > 0) | (middle > 0)) & ~np.isnan(value.values) & ~np.isnan(middle)
+    held = (low <= value.values) & (value.values <= high)
+    return int((held & asked).sum()), int(asked.sum())
