@@ -258,7 +258,8 @@ def fragility(outcomes: xr.Dataset, friction: ArrayLike, *, confidence: float = 
     Dataset
         ``probability``, ``probability_low``, ``probability_high`` and ``known`` over ``friction``. A
         sample that is undecided counts as stable in the lower limit and as unstable in the upper one.
-        From the exact method, which draws nothing, limits are bounds by what is unknown alone.
+        Where every level of a discrete input comes once and nothing else is uncertain, limits are
+        bounds by what is unknown alone.
 
     Raises
     ------
@@ -282,7 +283,7 @@ def fragility(outcomes: xr.Dataset, friction: ArrayLike, *, confidence: float = 
     unstable = _covered(outcomes["interval"].values[known], weight[known], grid, (lower, upper))
     unknown = weight[~known].sum()
     limits = [unstable, unstable + unknown]
-    drawn = outcomes.attrs.get("method") != "exact"
+    drawn = not _enumerated(outcomes)
     if drawn:
         # Samples of unequal weight tell as much as this many of equal weight (Kish).
         size = np.full(grid.size, 1.0 / np.square(weight).sum())
@@ -301,6 +302,15 @@ def fragility(outcomes: xr.Dataset, friction: ArrayLike, *, confidence: float = 
     curve = xr.Dataset(data, coords={"friction": ("friction", grid, schema.PARAMETERS[FRICTION].attrs)})
     curve = schema.stamp(curve, f"fragility at {grid.size} frictions", like=outcomes.attrs)
     return curve.assign_attrs(confidence=confidence if drawn else 1.0)
+
+
+def _enumerated(outcomes: xr.Dataset) -> bool:
+    """Say whether outcomes are those of every level of a discrete input once, so that none was drawn."""
+    if "weight" not in outcomes.coords or not outcomes.attrs.get("inputs"):
+        return False
+    inputs = Inputs.from_json(str(outcomes.attrs["inputs"]))
+    whole = np.isclose(float(outcomes["weight"].sum()), 1.0, rtol=0, atol=1e-9)
+    return bool(whole and set(inputs) <= set(inputs.discrete))
 
 
 def _covered(intervals: Array, weight: Array, grid: Array, swept: tuple[float, float]) -> Array:

@@ -172,7 +172,9 @@ def estimate(
     A variable of role ``"verdict"``, a boolean one, and one without units and role that holds
     nothing but 0, 1 and NaN gives probabilities with a Wilson interval; one of role
     ``"probability"`` their mean with a t interval; any other mean and variance. With replicates the
-    interval is that between replicates; where they do not differ, that of the pooled sample.
+    interval is that between replicates; where they do not differ, that of the pooled sample. Where the
+    strata leave no input to chance, as with friction integrated and every contact pattern once, there is
+    no sampling error: the limits are what is unknown alone, and the confidence is 1.
 
     Parameters
     ----------
@@ -181,7 +183,7 @@ def estimate(
     inputs : Inputs
         The inputs of the design; their levels label the strata.
     of : str
-        Name of the outcome.
+        Name of the outcome. If the outcomes hold ``<of>_low`` and ``<of>_high``, they bound each sample.
     rng : int or Generator, optional
         Not used: nothing here is random.
     confidence : float, default 0.95
@@ -206,10 +208,15 @@ def estimate(
     levels, level = levels_of(outcomes, inputs)
     strata = 1 if levels is None else levels.sizes[levels.attrs["dim"]]
     replicates, replicate = _replicates(outcomes)
-    cells = moments(values, level * replicates + replicate, strata * replicates)
-    table = cells.reshaped(strata, replicates)
+    cell = level * replicates + replicate
+    table, *bounds = (
+        moments(part, cell, strata * replicates).reshaped(strata, replicates)
+        for part in (values, *_bounds(outcomes, of))
+    )
+    if levels is not None and set(inputs) <= set(inputs.discrete):
+        confidence = 1.0
     dims = ([] if levels is None else [levels.attrs["dim"]]) + [str(d) for d in values.dims[1:]]
-    columns = _columns(table, kind, confidence)
+    columns = _columns(table, bounds, kind, confidence)
     arrays = {
         name: xr.DataArray(column if levels is not None else column[0], dims=dims)
         for name, column in columns.items()
@@ -228,13 +235,22 @@ def _replicates(outcomes: xr.Dataset) -> tuple[int, NDArray[np.intp]]:
     return len(names), replicate.astype(np.intp)
 
 
-def _columns(cells: Moments, kind: Kind, confidence: float) -> dict[str, Array]:
+def _bounds(outcomes: xr.Dataset, of: str) -> list[xr.DataArray]:
+    """Return the bounds of each sample's outcome, if the outcomes hold them."""
+    names = [f"{of}_low", f"{of}_high"]
+    return [outcomes[name] for name in names] if all(name in outcomes for name in names) else []
+
+
+def _columns(cells: Moments, bounds: list[Moments], kind: Kind, confidence: float) -> dict[str, Array]:
     """Return estimates and limits by stratum from moments (strata, replicates, ...)."""
     pooled = cells.pooled()
-    floor, ceiling = cells, cells
-    if kind.bounded:
+    floor, ceiling = bounds or (cells, cells)
+    if kind.bounded and not bounds:
         floor, ceiling = cells.with_unknown(0.0), cells.with_unknown(1.0)
-    low, high = _limit(floor, kind, confidence)[0], _limit(ceiling, kind, confidence)[1]
+    if confidence == 1:
+        low, high = floor.pooled().mean, ceiling.pooled().mean
+    else:
+        low, high = _limit(floor, kind, confidence)[0], _limit(ceiling, kind, confidence)[1]
     if kind.bounded:
         low, high = np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
     return {

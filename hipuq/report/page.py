@@ -14,7 +14,16 @@ import xarray as xr
 from hipuq.errors import StoreError
 from hipuq.report.figures import pictures
 from hipuq.report.partners import comparison, groups_of
-from hipuq.report.summary import bounded, estimates, headline, inputs_table, is_exact, tables, trust
+from hipuq.report.summary import (
+    bounded,
+    estimates,
+    headline,
+    inputs_table,
+    integrated,
+    is_exact,
+    tables,
+    trust,
+)
 
 RESOLUTION = 130
 """Dots per inch of the pictures."""
@@ -98,7 +107,10 @@ def content(tree: xr.DataTree, images: dict[str, list[dict[str, str]]]) -> dict[
                 "tables": [table for results in found.values() for table in tables(results, names)],
                 "images": images.get(analysis, []),
                 "exact": is_exact(first),
-                "bounded": any(bounded(results, "probability") for results in found.values()),
+                "integrated": bool(integrated(first)),
+                "bounded": any(
+                    "probability" in one and bounded(one, "probability") for one in found.values()
+                ),
                 "comparison": comparison(analysis, groups),
                 "confidence": f"{first.attrs['confidence']:.0%}",
             }

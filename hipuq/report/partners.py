@@ -81,27 +81,36 @@ def _case(results: xr.Dataset) -> tuple[object, ...]:
 
 
 def comparison(analysis: str, found: Found) -> str:
-    """Return in one line how many intervals of a sampled analysis hold the exact value; empty without one.
+    """Return in one line how sampled and exact probabilities compare; empty without both.
 
-    Intervals are those of the mean over a group of levels. Where a mode is never unstable, exactly and
-    in the samples, there is nothing to compare.
+    Of a sampled analysis it says how many intervals of the mean over a group hold the exact value, of
+    an exact one where the same is sampled. Where a mode is never unstable, neither exactly nor in the
+    samples, there is nothing to compare.
     """
     told: dict[str, list[str]] = {}
-    levels = set()
-    whole = [one for one in found[analysis].values() if "probability_mean" in one]
-    for sampled in sorted(whole, key=lambda one: one["probability_mean"].ndim):
+    for sampled in _summed(found[analysis]):
         other = exact_of(sampled, found)
-        if other is None:
-            continue
-        exact = found[other][EXACT[str(sampled.attrs["of"])]]
-        held, count = _held(sampled, exact)
-        by = "group and mode" if "mode" in sampled["probability_mean"].dims else "group"
-        told.setdefault(other, []).append(f"{held} of {count} by {by}")
-        levels.add(f"{sampled.attrs['confidence']:.0%}")
-    return "; ".join(
-        f"{' or '.join(sorted(levels))} intervals that hold the exact value ({other}): {', '.join(parts)}"
-        for other, parts in told.items()
-    )
+        if other is not None:
+            held, count = _held(sampled, found[other][EXACT[str(sampled.attrs["of"])]])
+            by = "group and mode" if "mode" in sampled["probability_mean"].dims else "group"
+            level = f"{sampled.attrs['confidence']:.0%}"
+            line = f"{level} intervals that hold the exact value ({other})"
+            told.setdefault(line, []).append(f"{held} of {count} by {by}")
+    by_sampling = [
+        name
+        for name, groups in found.items()
+        if any(exact_of(sampled, found) == analysis for sampled in _summed(groups))
+    ]
+    lines = [f"{line}: {', '.join(parts)}" for line, parts in told.items()]
+    if by_sampling:
+        lines.append(f"The same by sampling: {', '.join(by_sampling)}")
+    return "; ".join(lines)
+
+
+def _summed(groups: Mapping[str, xr.Dataset]) -> list[xr.Dataset]:
+    """Return the results that are summed up by group, those without modes first."""
+    found = [one for one in groups.values() if "probability_mean" in one]
+    return sorted(found, key=lambda one: one["probability_mean"].ndim)
 
 
 def _held(sampled: xr.Dataset, exact: xr.Dataset) -> tuple[int, int]:

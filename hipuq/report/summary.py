@@ -252,11 +252,15 @@ def inputs_table(results: xr.Dataset) -> Table:
             ]
             how += f", one draw for each {entry['dims'][0]}" if entry["each"] else ""
         rows.append([name, *_meaning(name), how, drawn])
-    model = json.loads(results.attrs["options"]).get("model")
-    integrated = model.get("integrated", {}) if isinstance(model, dict) else {}
-    for name, source in integrated.items():
+    for name, source in integrated(results).items():
         rows.insert(0, [name, *_meaning(name), "integrated, not sampled", _distribution(source)])
     return Table("Uncertain inputs", ["parameter", "meaning", "unit", "applied as", "distribution"], rows)
+
+
+def integrated(results: xr.Dataset) -> Mapping[str, Mapping[str, Any]]:
+    """Return the parameters that the model integrates, with the description of their distribution."""
+    model = json.loads(results.attrs.get("options") or "{}").get("model")
+    return model.get("integrated", {}) if isinstance(model, dict) else {}
 
 
 def _meaning(name: str) -> tuple[str, str]:
