@@ -9,6 +9,7 @@ J. Comput. Appl. Math. 344 (2018) 259).
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -155,11 +156,11 @@ class FrictionIntegrated:
         ]
         cells = stability_cells(
             self.model.pencils(samples),
-            self.lower,
-            self.upper,
+            *self._swept(),
             growth_threshold=self.model.growth_threshold,
             by_mode="probability_by_mode" in wanted,
         )
+        cells = [replace(one, edges=one.edges.clip(self.lower, self.upper)) for one in cells]
         return self._outcomes(cells, wanted)
 
     def _outcomes(self, cells: list[Cells], wanted: list[str]) -> xr.Dataset:
@@ -167,14 +168,15 @@ class FrictionIntegrated:
         parts = {
             "probability": [m @ (one.any_unstable == 1) for m, one in zip(mass, cells, strict=True)],
             "unknown": [m @ np.isnan(one.any_unstable) for m, one in zip(mass, cells, strict=True)],
-            "covered": [m.sum() for m in mass],
+            "covered": [m @ np.ones(len(m)) for m in mass],
         }
-        unstable, unknown, covered = (np.array(part) for part in parts.values())
+        # Differences of probabilities may add up to 1 and a little.
+        unstable, unknown, covered = (np.minimum(part, 1.0) for part in parts.values())
         known = unknown == 0
         by_mode = [m @ (one.unstable == 1) for m, one in zip(mass, cells, strict=True)]
         modes = np.array([not np.isnan(one.unstable).any() for one in cells])
         intervals = [one.intervals(one.any_unstable) for one in cells]
-        onsets = [_onset(one, known) for one, known in zip(cells, known, strict=True)]
+        onsets = [_onset(one) for one in cells]
         longest = max((len(own) for own in intervals), default=0)
         padded = np.full((len(cells), longest, 2), np.nan)
         for row, own in zip(padded, intervals, strict=True):
@@ -215,10 +217,22 @@ class FrictionIntegrated:
         split = cdf(inner + np.where(rises, SIDE, -SIDE) * np.abs(inner)) if inner.size else inner
         first = float(cdf(np.array([np.nextafter(self.lower, -np.inf)]))[0])
         last = float(cdf(np.array([self.upper]))[0])
-        return np.diff(np.concatenate([[first], split, [last]]))
+        # Boundaries nearer to each other, or to an end, than SIDE must not change places.
+        ascending = np.maximum.accumulate(np.clip(split, first, last))
+        return np.diff(np.concatenate([[first], ascending, [last]]))
+
+    def _swept(self) -> tuple[float, float]:
+        """Return the range, a little wider at an end that is an atom: a boundary there is to be found."""
+        cdf = self.distribution.cdf
+        assert cdf is not None
+        ends = np.array([self.lower, self.upper])
+        reach = SIDE * np.abs(ends)
+        atom = cdf(ends) - cdf(np.nextafter(ends - [0.0, reach[1]], -np.inf)) > TAIL
+        low, high = ends + np.where(atom, 2 * reach, 0.0) * [-1.0, 1.0]
+        return float(low), float(high)
 
 
-def _onset(cells: Cells, known: bool) -> float:
+def _onset(cells: Cells) -> float:
     """Return where the first unstable cell begins, infinity if none does, NaN behind an unknown one."""
     verdict = cells.any_unstable
     first = int(np.argmax(verdict == 1)) if (verdict == 1).any() else len(verdict)

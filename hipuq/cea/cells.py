@@ -214,7 +214,8 @@ def _pieces(
             pieces[-1] = replace(pieces[-1], last=x)
         else:
             pieces.append(_Piece(row, start if not pieces else x, x, x, own))
-    if not pieces:
+    # A verdict that contradicts the boundaries shows that one was missed: then nothing is known.
+    if not pieces or not (fits | np.isnan(unstable).any(axis=1)).all():
         return [_Piece(row, start, start, start, np.full(unstable.shape[1], np.nan))]
     return pieces
 

@@ -161,4 +161,6 @@ def structured_values(
     values, radius = structured_eigenvalues(matrices, np.where(zero, 0.0, start), size, fixed, rough=True)
     found = np.isfinite(radius)
     values = np.where(found & (np.abs(values.imag) <= radius), values.real, values)
-    return np.where(found.all(axis=1, keepdims=True), values, start)
+    # Roots whose number of upper and lower ones differs are not those of a real matrix.
+    usable = found.all(axis=1) & ((values.imag > 0).sum(axis=1) == (values.imag < 0).sum(axis=1))
+    return np.where(usable[:, None], values, start)

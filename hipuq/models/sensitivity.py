@@ -67,7 +67,7 @@ def onset_sensitivity(
     Examples
     --------
     >>> import hipuq
-    >>>  = hipuq.models.two_dof("hulten")
+    >>> model = hipuq.models.two_dof("hulten")
     >>> found = hipuq.onset_sensitivity(model, friction=7 / 24, frequency=7812.5**0.5)
     >>> float(found["frequency_1"].round(6))
     0.010417
