@@ -148,7 +148,8 @@ class FrictionIntegrated:
         -------
         Dataset
             Over ``sample``, ``mode`` and ``interval``; see `hipuq.schema.INTEGRATED`. A probability is
-            that among the friction of known verdict, and NaN where part of the sweep is undecided.
+            the share among the friction whose verdict is known, NaN where none is; a sample of which a
+            part of the sweep is not known has the status ``undecided``.
         """
         self._refuse(samples.variables)
         wanted = [
@@ -165,16 +166,9 @@ class FrictionIntegrated:
 
     def _outcomes(self, cells: list[Cells], wanted: list[str]) -> xr.Dataset:
         mass = [self._mass(one) for one in cells]
-        parts = {
-            "probability": [m @ (one.any_unstable == 1) for m, one in zip(mass, cells, strict=True)],
-            "unknown": [m @ np.isnan(one.any_unstable) for m, one in zip(mass, cells, strict=True)],
-            "covered": [m @ np.ones(len(m)) for m in mass],
-        }
-        # Differences of probabilities may add up to 1 and a little.
-        unstable, unknown, covered = (np.minimum(part, 1.0) for part in parts.values())
-        known = unknown == 0
-        by_mode = [m @ (one.unstable == 1) for m, one in zip(mass, cells, strict=True)]
-        modes = np.array([not np.isnan(one.unstable).any() for one in cells])
+        unstable, decided = _shares(mass, [one.any_unstable[:, None] for one in cells])
+        by_mode, modes_decided = _shares(mass, [one.unstable for one in cells])
+        known = np.array([not np.isnan(one.any_unstable).any() for one in cells])
         intervals = [one.intervals(one.any_unstable) for one in cells]
         onsets = [_onset(one) for one in cells]
         longest = max((len(own) for own in intervals), default=0)
@@ -182,10 +176,10 @@ class FrictionIntegrated:
         for row, own in zip(padded, intervals, strict=True):
             row[: len(own)] = own
         values = {
-            "probability": np.where(known, unstable / covered, np.nan),
-            "probability_low": unstable,
-            "probability_high": unstable + unknown + (1.0 - covered),
-            "probability_by_mode": np.where(modes[:, None], np.stack(by_mode) / covered[:, None], np.nan),
+            "probability": (unstable / decided)[:, 0],
+            "probability_low": unstable[:, 0],
+            "probability_high": 1.0 - np.fmax(decided - unstable, 0.0)[:, 0],
+            "probability_by_mode": by_mode / modes_decided,
             "onset": np.array(onsets),
             "interval": padded,
             "interval_count": np.where(known, [float(len(own)) for own in intervals], np.nan),
@@ -230,6 +224,14 @@ class FrictionIntegrated:
         atom = cdf(ends) - cdf(np.nextafter(ends - [0.0, reach[1]], -np.inf)) > TAIL
         low, high = ends + np.where(atom, 2 * reach, 0.0) * [-1.0, 1.0]
         return float(low), float(high)
+
+
+def _shares(mass: list[Array], verdicts: list[Array]) -> tuple[Array, Array]:
+    """Return the probability of a verdict of 1, and of any; verdicts are (cells, k), results (samples, k)."""
+    # Differences of probabilities may add up to 1 and a little.
+    pairs = [(m @ (one == 1), m @ ~np.isnan(one)) for m, one in zip(mass, verdicts, strict=True)]
+    unstable, decided = (np.minimum(np.stack(part), 1.0) for part in zip(*pairs, strict=True))
+    return np.minimum(unstable, decided), np.where(decided > 0, decided, np.nan)
 
 
 def _onset(cells: Cells) -> float:

@@ -124,6 +124,11 @@ COORDINATES: dict[str, Variable] = {
 """Coordinates and dims."""
 
 
+def is_exact(results: xr.Dataset) -> bool:
+    """Say whether results have no sampling error: limits that hold with a confidence of 1."""
+    return bool(results.attrs.get("confidence") == 1)
+
+
 def flag_attrs(long_name: str, flags: Mapping[str, int]) -> dict[str, Any]:
     """Return CF attributes of an integer flag variable."""
     return {

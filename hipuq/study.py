@@ -246,17 +246,14 @@ def _analysis(table: StudyFile, name: str) -> Analysis:
     model = base if not entry.integrate_friction else _integrated(base, given)
     inputs = model.inputs(**given)
     method: Method = method_named(entry.method)
-    n = entry.n
-    if n is None:
-        if method.sized:
-            raise InputError(f"n is missing: the method {entry.method!r} needs the size of its design")
-        n = 1
     designing, estimating = method.split(entry.options)
     for of in entry.of:
         check_name("outcome in of", of, model.outcomes)
-    evaluations = method.evaluations(inputs, n, **designing)
+    evaluations = method.evaluations(inputs, entry.n, **designing)
     _check_report(table.report, base)
-    return Analysis(name, model, inputs, entry.method, n, tuple(entry.of), designing, estimating, evaluations)
+    return Analysis(
+        name, model, inputs, entry.method, entry.n, tuple(entry.of), designing, estimating, evaluations
+    )
 
 
 def _integrated(model: CEAModel, inputs: dict[str, object]) -> FrictionIntegrated:

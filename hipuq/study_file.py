@@ -86,8 +86,8 @@ class AnalysisTable(Table):
         Name of the group in the results: letters, digits, ``-`` and ``_``.
     method : str
         Name of a method.
-    n : int or None
-        Size of the design; methods that have none to choose do without.
+    n : int
+        Size of the design.
     integrate_friction : bool
         Whether friction is integrated over its distribution instead of sampled.
     of : list of str
@@ -100,7 +100,7 @@ class AnalysisTable(Table):
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=60)
     method: str
-    n: int | None = Field(default=None, ge=1)
+    n: int = Field(ge=1)
     integrate_friction: bool = False
     of: list[str] = Field(min_length=1)
     options: dict[str, Any] = {}

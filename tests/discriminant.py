@@ -21,6 +21,25 @@ def meetings(constant: np.ndarray, slope: np.ndarray, lower: float, upper: float
     # degree 2n - 2 in the coefficients.
     degree = min(n * (n - 1), one.rank() * (2 * n - 2))
     values = [(zero + t * one).charpoly().discriminant() for t in range(degree + 1)]
+    return _sign_changes(values, lower, upper)
+
+
+def zeros(
+    constant: np.ndarray, slope: np.ndarray, lower: float, upper: float, mechanisms: int = 0
+) -> list[float]:
+    """Return the frictions in a range at which the product of the roots changes sign, ascending.
+
+    With mechanisms, roots that are zero but for rounding, that of all others.
+    """
+    n = len(constant)
+    zero, one = (flint.fmpz_mat(n, n, part) for part in _whole(np.stack([constant, slope])))
+    values = [(zero + t * one).charpoly()[mechanisms] for t in range(one.rank() + 1)]
+    return _sign_changes(values, lower, upper)
+
+
+def _sign_changes(values: list[flint.fmpz], lower: float, upper: float) -> list[float]:
+    """Return where the polynomial with these values at 0, 1, ... changes sign in a range, ascending."""
+    degree = len(values) - 1
     differences = []
     while values:
         differences.append(values[0])
@@ -31,7 +50,7 @@ def meetings(constant: np.ndarray, slope: np.ndarray, lower: float, upper: float
         polynomial = flint.fmpz_poly([-k, 1]) * polynomial + flint.fmpz_poly([differences[k] * weight])
         weight *= max(k, 1)
     if polynomial == 0:
-        raise ValueError("the pencil has a multiple eigenvalue at every friction")
+        raise ValueError("the polynomial is zero at every friction")
     found = []
     for factor, times in polynomial.factor_squarefree()[1]:
         if times % 2:

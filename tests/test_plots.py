@@ -229,7 +229,7 @@ def test_occurrence_refuses(results):
 def exact(results):
     """What an exact analysis gives: the same quantities, no limits, here with values of their own."""
     names = ["probability_min", "probability_mean", "probability_max"]
-    return (0.9 * results[names]).assign_attrs(method="exact")
+    return (0.9 * results[names]).assign_attrs(confidence=1.0)
 
 
 def test_exact_values_stand_beside_sampled_ones(results, exact):
@@ -269,7 +269,6 @@ def test_unknown_exact_values_are_left_out(results, exact):
 
 
 def test_exact_results_stand_alone(results, exact):
-    exact = exact.assign_attrs(confidence=0.95)
     ax = drawn(plots.occurrence(exact, 7))
     np.testing.assert_allclose(means(ax), 100 * exact["probability_mean"].sel(count=7, mode=slice(11, 18)))
     assert sorted(labels(ax)) == ["maximum", "mean", "minimum"]

@@ -28,7 +28,7 @@ def exact(sampled):
     limits = [name for name in sampled if str(name).endswith(("_low", "_high"))]
     return sampled.drop_vars(limits).assign_attrs(
         model=f"{sampled.attrs['model']}, friction integrated",
-        method="exact",
+        confidence=1.0,
         of="probability_by_mode",
         inputs=json.dumps(inputs),
         options=json.dumps(options),
@@ -95,7 +95,7 @@ OTHERS = {
     "inputs": lambda exact: exact.assign_attrs(inputs=json.dumps({"contact": {"in_contact": [9]}})),
     "counts": lambda exact: exact.sel(count=[9]),
     "modes": lambda exact: exact.sel(mode=slice(11, 18)),
-    "sampled too": lambda exact: exact.assign_attrs(method="monte_carlo"),
+    "sampled too": lambda exact: exact.assign_attrs(confidence=0.95),
 }
 
 

@@ -25,9 +25,11 @@ of = ["unstable", "any_unstable"]
 options = { stratify = "contact" }
 [[analysis]]
 name = "certain"
-method = "exact"
+method = "monte_carlo"
+n = 1
 integrate_friction = true
 of = ["probability", "probability_by_mode"]
+options = { stratify = "contact" }
 """
 )
 

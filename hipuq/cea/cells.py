@@ -8,7 +8,7 @@ a stable one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hipuq.cea.boundary import Boundary
 from hipuq.cea.damped_onset import damped_boundaries
-from hipuq.cea.onset import boundaries, check_range
+from hipuq.cea.onset import check_range, search
 from hipuq.cea.pencils import Array, Pencils
 from hipuq.cea.spectrum import solve
 from hipuq.errors import InputError
@@ -99,7 +99,7 @@ def stability_cells(
         If the range is not one, or a threshold is negative.
     """
     check_range(lower, upper)
-    found = _all_boundaries(pencils, lower, upper, growth_threshold)
+    found, unresolved = _all_boundaries(pencils, lower, upper, growth_threshold)
     edges = [np.array([lower, *(one.friction for one in own or ()), upper]) for own in found]
     row = np.repeat(np.arange(len(edges)), [len(own) - 1 for own in edges])
     start, end = (np.concatenate([own[part] for own in edges]) for part in (slice(-1), slice(1, None)))
@@ -119,8 +119,20 @@ def stability_cells(
     for i, own in enumerate(found):
         parts = [part for j in np.flatnonzero(row == i) for part in pieces[j]]
         at = np.array([part.start for part in parts] + [upper])
-        cells.append(Cells(at, np.stack([part.unstable for part in parts]), tuple(own or ())))
+        whole = Cells(at, np.stack([part.unstable for part in parts]), tuple(own or ()))
+        cells.append(_without(whole, unresolved[i]))
     return cells
+
+
+def _without(cells: Cells, unresolved: Array) -> Cells:
+    """Return cells of which nothing is known in some intervals of friction, (k, 2)."""
+    if not len(unresolved):
+        return cells
+    edges = np.union1d(cells.edges, unresolved.clip(cells.edges[0], cells.edges[-1]))
+    middle = (edges[:-1] + edges[1:]) / 2
+    unstable = cells.unstable[np.searchsorted(cells.edges, middle) - 1]
+    lost = ((unresolved[:, :1] < middle) & (middle < unresolved[:, 1:])).any(axis=0)
+    return Cells(edges, np.where(lost[:, None], np.nan, unstable), cells.boundaries)
 
 
 @dataclass(frozen=True)
@@ -136,45 +148,37 @@ class _Piece:
 
 def _all_boundaries(
     pencils: Pencils, lower: float, upper: float, growth_threshold: float
-) -> list[tuple[Boundary, ...] | None]:
-    """Return the boundaries of each sample, None where they cannot be told apart."""
+) -> tuple[list[tuple[Boundary, ...] | None], list[Array]]:
+    """Return the boundaries of each sample, None where they cannot be told apart, and what is unresolved."""
     samples = len(pencils.stiffness)
     damped = np.full(samples, growth_threshold > 0)
     if pencils.damping is not None:
         damped |= pencils.damping.any(axis=(1, 2))
     found: list[tuple[Boundary, ...] | None] = [None] * samples
-    for rows, search in ((np.flatnonzero(~damped), _undamped), (np.flatnonzero(damped), damped_boundaries)):
+    unresolved = [np.empty((0, 2))] * samples
+
+    def look(rows: Rows) -> None:
+        own = pencils.rows(rows)
+        if damped[rows].any():
+            parts = damped_boundaries(own, lower, upper, growth_threshold)
+        else:
+            both = search(replace(own, damping=None), lower, upper)
+            parts = both.boundaries
+            for i, left in zip(rows, both.unresolved, strict=True):
+                unresolved[i] = left
+        for i, part in zip(rows, parts, strict=True):
+            found[i] = tuple(part)
+
+    for rows in (np.flatnonzero(~damped), np.flatnonzero(damped)):
         try:
-            parts: list[list[Boundary] | None] = []
             if rows.size:
-                parts += search(pencils.rows(rows), lower, upper, growth_threshold)
+                look(rows)
         except InputError:
             # One sample that cannot be searched takes no other with it.
-            parts = [_searched(search, pencils.rows([i]), lower, upper, growth_threshold) for i in rows]
-        for i, part in zip(rows, parts, strict=True):
-            found[i] = None if part is None else tuple(part)
-    return found
-
-
-def _undamped(pencils: Pencils, lower: float, upper: float, _: float) -> list[list[Boundary]]:
-    """Return the boundaries of undamped samples."""
-    if pencils.damping is not None:
-        pencils = replace(pencils, damping=None)
-    return boundaries(pencils, lower, upper)
-
-
-def _searched(
-    search: Callable[[Pencils, float, float, float], list[list[Boundary]]],
-    pencils: Pencils,
-    lower: float,
-    upper: float,
-    growth_threshold: float,
-) -> list[Boundary] | None:
-    """Return the boundaries of one sample, None where they cannot be told apart."""
-    try:
-        return search(pencils, lower, upper, growth_threshold)[0]
-    except InputError:
-        return None
+            for i in rows:
+                with suppress(InputError):
+                    look(np.array([i]))
+    return found, unresolved
 
 
 def _looks(count: int) -> Array:

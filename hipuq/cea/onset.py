@@ -10,6 +10,8 @@ zero. The boundary is then solved for and proved with the exact characteristic p
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from hipuq.cea.boundary import Boundary, proved
@@ -17,6 +19,12 @@ from hipuq.cea.gaps import NARROWEST, PARABOLIC, Bracket, Mask, Triple, crossing
 from hipuq.cea.pencils import Array, Pencils
 from hipuq.cea.points import Points, Rows, Sweep
 from hipuq.errors import InputError
+
+MOST = 1500
+"""Open intervals of one sample at once from which those narrower than `CROWDED` are left unresolved."""
+
+CROWDED = 1e-5
+"""See `MOST`. Parts nearer to each other than this are left as one."""
 
 REACH = 0.02
 """How far from the minimum of a gap an interval is cut on both sides, as part of its width."""
@@ -43,13 +51,61 @@ def boundaries(pencils: Pencils, lower: float, upper: float) -> list[list[Bounda
     Raises
     ------
     InputError
-        If the range does not ascend, is not finite, a sample is damped, or several pairs merge at once.
+        As `search`; or if a part of the range is left unresolved.
+    """
+    found = search(pencils, lower, upper)
+    for i, parts in enumerate(found.unresolved):
+        if len(parts):
+            raise InputError(
+                f"sample {i} cannot be resolved between friction {parts[0, 0]:.6g} and {parts[-1, 1]:.6g}: "
+                "its eigenvalues nearly meet there all the way, to within their rounding"
+            )
+    return found.boundaries
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search found.
+
+    Attributes
+    ----------
+    boundaries : list of list of Boundary
+        For each sample, ascending.
+    unresolved : list of (k, 2) array
+        For each sample the parts of the range in which so many eigenvalues nearly meet, to within
+        their rounding, that nothing can be said.
+    """
+
+    boundaries: list[list[Boundary]]
+    unresolved: list[Array]
+
+
+def search(pencils: Pencils, lower: float, upper: float) -> Search:
+    """Find every friction in a range at which the number of unstable modes changes, as far as it can be.
+
+    Parameters
+    ----------
+    pencils : Pencils
+        s samples without damping; their own friction is not used.
+    lower, upper : float
+        Range of friction, lower < upper [1].
+
+    Returns
+    -------
+    Search
+
+    Raises
+    ------
+    InputError
+        If the range does not ascend, is not finite, a sample is damped, or has fewer mechanisms than
+        declared.
     """
     check_range(lower, upper)
     if pencils.damping is not None and pencils.damping.any():
         raise InputError("boundaries are found for undamped pencils only: damping must be zero")
     sweep = Sweep(pencils, max(abs(lower), abs(upper)))
-    return proved(sweep, _brackets(sweep, lower, upper))
+    brackets, unresolved = _brackets(sweep, lower, upper)
+    return Search(proved(sweep, brackets), unresolved)
 
 
 def check_range(lower: float, upper: float) -> None:
@@ -65,14 +121,15 @@ def start_grid(lower: float, upper: float) -> Array:
     return np.concatenate([np.linspace(lower, 1.0, GRID), np.geomspace(1.0, upper, GRID)[1:]])
 
 
-def _brackets(sweep: Sweep, lower: float, upper: float) -> list[Bracket]:
-    """Return intervals of friction that hold one boundary each."""
+def _brackets(sweep: Sweep, lower: float, upper: float) -> tuple[list[Bracket], list[Array]]:
+    """Return intervals of friction that hold one boundary each, and what is left of each sample."""
     samples = len(sweep.constant)
     grid = start_grid(lower, upper)
     points = sweep.points(np.repeat(np.arange(samples), len(grid)), np.tile(grid, samples))
     index = np.arange(samples * len(grid)).reshape(samples, -1)
     todo = np.stack([index[:, :-1].ravel(), index[:, 1:].ravel()])
     found: list[Bracket] = []
+    left: list[list[tuple[float, float]]] = [[] for _ in range(samples)]
     while todo.size:
         a, b = points.take(todo[0]), points.take(todo[1])
         m = sweep.points(a.row, (a.friction + b.friction) / 2)
@@ -80,6 +137,10 @@ def _brackets(sweep: Sweep, lower: float, upper: float) -> list[Bracket]:
         points += m
         open_, vertex, brackets = _judged((a, m, b))
         found += brackets
+        crowd = np.bincount(a.row[open_], minlength=samples)[a.row] > MOST
+        for i in np.flatnonzero(open_ & crowd & (b.friction - a.friction < CROWDED)):
+            left[a.row[i]].append((float(a.friction[i]), float(b.friction[i])))
+            open_[i] = False
         halves = np.flatnonzero(open_ & np.isnan(vertex))
         parts = [[todo[0, halves], middle[halves]], [middle[halves], todo[1, halves]]]
         # Where the gap has a minimum: a narrow interval about it, and what is left on both sides. It
@@ -94,7 +155,18 @@ def _brackets(sweep: Sweep, lower: float, upper: float) -> list[Bracket]:
         parts += [[todo[0, thirds], low], [low, high], [high, todo[1, thirds]]]
         todo = np.concatenate([np.stack(part) for part in parts], axis=1)
         todo = todo[:, points.friction[todo[0]] < points.friction[todo[1]]]
-    return found
+    return found, [_joined(parts) for parts in left]
+
+
+def _joined(parts: list[tuple[float, float]]) -> Array:
+    """Return intervals in order, those nearer than CROWDED made one, (k, 2)."""
+    made: list[list[float]] = []
+    for start, end in sorted(parts):
+        if made and start - made[-1][1] < CROWDED:
+            made[-1][1] = max(made[-1][1], end)
+        else:
+            made.append([start, end])
+    return np.array(made, dtype=np.float64).reshape(-1, 2)
 
 
 def _judged(points: Triple) -> tuple[Mask, Array, list[Bracket]]:

@@ -1,6 +1,6 @@
 """Methods: each is one file with ``design``, ``estimate`` and ``evaluations``, and one line in `METHODS`."""
 
-from hipuq.methods import exact, monte_carlo
+from hipuq.methods import monte_carlo
 from hipuq.methods.base import Method
 
 METHODS: dict[str, Method] = {
@@ -9,13 +9,6 @@ METHODS: dict[str, Method] = {
         design=monte_carlo.design,
         estimate=monte_carlo.estimate,
         evaluations=monte_carlo.evaluations,
-    ),
-    "exact": Method(
-        title="exact",
-        design=exact.design,
-        estimate=exact.estimate,
-        evaluations=exact.evaluations,
-        sized=False,
     ),
 }
 """Name of a method -> its functions."""

@@ -36,8 +36,6 @@ class Method:
         ``(inputs, n, **options of design) -> int``.
     refine : callable or None
         ``(outcomes, inputs, rng, **options) -> samples or None``, of a sequential method.
-    sized : bool
-        Whether the size n of a design has to be chosen; if not it is 1.
     """
 
     title: str
@@ -45,7 +43,6 @@ class Method:
     estimate: Callable[..., xr.Dataset]
     evaluations: Callable[..., int]
     refine: Callable[..., xr.Dataset | None] | None = None
-    sized: bool = True
 
     def options(self, stage: str) -> dict[str, Any]:
         """Return the options of ``"design"`` or ``"estimate"`` with their defaults."""

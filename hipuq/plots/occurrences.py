@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from hipuq.errors import InputError, SchemaError
 from hipuq.plots.style import BLACK, BLUE, VERMILLION, axis_label, new_axes, new_panels
+from hipuq.schema import is_exact
 
 NEEDED = ("probability_min", "probability_mean", "probability_max")
 LAST = 8
@@ -251,7 +252,7 @@ def _probability_label(results: xr.Dataset) -> str:
 
 def _mean_label(results: xr.Dataset) -> str:
     """Return the legend of a mean with limits: what they are, where that is known."""
-    if results.attrs.get("method") == "exact":
+    if is_exact(results):
         return "mean, limits of the unknown"
     level = results.attrs.get("confidence")
     return "mean" if level is None else f"mean, {100 * float(level):g} % interval"

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from hipuq import plots
 from hipuq.report.partners import exact_of, groups_of, summed_up
+from hipuq.schema import is_exact
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def _occurrence(
         "Frequency of occurrence of instability by mode: minimum, mean and maximum over the contact "
         "patterns of each number in contact."
     )
-    if results.attrs.get("method") != "exact":
+    if not is_exact(results):
         caption += (
             " Samples without a known verdict are left out here and counted in the limits of the table."
         )

@@ -11,6 +11,7 @@ from typing import Any
 
 import xarray as xr
 
+from hipuq import schema
 from hipuq.errors import StoreError
 from hipuq.report.figures import pictures
 from hipuq.report.partners import comparison, groups_of
@@ -20,7 +21,6 @@ from hipuq.report.summary import (
     headline,
     inputs_table,
     integrated,
-    is_exact,
     tables,
     trust,
 )
@@ -106,7 +106,7 @@ def content(tree: xr.DataTree, images: dict[str, list[dict[str, str]]]) -> dict[
                 "inputs": inputs_table(first),
                 "tables": [table for results in found.values() for table in tables(results, names)],
                 "images": images.get(analysis, []),
-                "exact": is_exact(first),
+                "exact": schema.is_exact(first),
                 "integrated": bool(integrated(first)),
                 "bounded": any(
                     "probability" in one and bounded(one, "probability") for one in found.values()

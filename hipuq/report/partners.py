@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from hipuq.report.summary import analyses
+from hipuq.schema import is_exact
 
 Found = Mapping[str, Mapping[str, xr.Dataset]]
 """Analysis -> name of a group -> its Dataset."""
@@ -56,7 +57,7 @@ def exact_of(sampled: xr.Dataset, found: Found) -> str | None:
         exact = groups.get(EXACT.get(str(sampled.attrs.get("of")), ""))
         if (
             summed_up(exact, dims)
-            and exact.attrs.get("method") == "exact"
+            and is_exact(exact)
             and str(exact.attrs.get("model", "")).startswith(label)
             and _case(exact) == _case(sampled)
             and all(set(exact[dim].values) == set(sampled[dim].values) for dim in dims)

@@ -73,14 +73,9 @@ def share(value: float, digits: int = 4) -> str:
     return MISSING if np.isnan(value) else f"{value:.{digits}f}"
 
 
-def is_exact(results: xr.Dataset) -> bool:
-    """Say whether results have no sampling error."""
-    return results.attrs.get("method") == "exact"
-
-
 def bounded(results: xr.Dataset, key: str) -> bool:
     """Say whether limits tell more than the value: always if sampled, else only where part is unknown."""
-    if not is_exact(results):
+    if not schema.is_exact(results):
         return True
     value = results[key].values
     ends = np.array([np.abs(results[f"{key}_{end}"].values - value) for end in ("low", "high")])
@@ -93,7 +88,7 @@ def interval(results: xr.Dataset, key: str) -> str:
     middle, low, high = (text(float(results[key + end])) for end in ("", "_low", "_high"))
     if not bounded(results, key):
         return middle
-    return f"{middle} ({'bounds ' if is_exact(results) else ''}{low} to {high})"
+    return f"{middle} ({'bounds ' if schema.is_exact(results) else ''}{low} to {high})"
 
 
 def headline(results: xr.Dataset) -> str:
@@ -204,7 +199,7 @@ def _by_mode(results: xr.Dataset, quantity: str, names: dict[str, str] | None) -
 
 
 def _limits(results: xr.Dataset) -> str:
-    return "bounds" if is_exact(results) else "interval"
+    return "bounds" if schema.is_exact(results) else "interval"
 
 
 def _heading(results: xr.Dataset, group: str) -> str:
@@ -225,7 +220,7 @@ def _text(results: xr.Dataset, quantity: str, digits: int) -> Callable[[float], 
     """Return what writes a value: a probability with so many decimals if exact, with four if sampled."""
     if not quantity.startswith("probability"):
         return number
-    return partial(share, digits=digits if is_exact(results) else 4)
+    return partial(share, digits=digits if schema.is_exact(results) else 4)
 
 
 def mode_label(results: xr.Dataset, mode: int, names: dict[str, str] | None = None) -> str:
@@ -244,7 +239,7 @@ def inputs_table(results: xr.Dataset) -> Table:
             counts = ", ".join(map(str, entry["in_contact"]))
             weights = "given weights" if "weights" in entry else "each number equally likely"
             drawn = f"all choices of {counts} of {entry['oscillators']}, {weights}"
-            how = "every pattern once" if is_exact(results) else "pattern"
+            how = "every pattern once" if schema.is_exact(results) else "pattern"
         else:
             drawn = _distribution(entry["distribution"])
             how = {"absolute": "value", "relative": "nominal * (1 + draw)", "shift": "nominal + draw"}[

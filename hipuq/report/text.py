@@ -10,8 +10,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table as RichTable
 
+from hipuq import schema
 from hipuq.report.partners import comparison, groups_of
-from hipuq.report.summary import Table, estimates, headline, is_exact, tables, trust
+from hipuq.report.summary import Table, estimates, headline, tables, trust
 
 
 def show_results(tree: xr.DataTree, console: Console | None = None) -> None:
@@ -31,8 +32,9 @@ def show_results(tree: xr.DataTree, console: Console | None = None) -> None:
     for analysis in found:
         for i, (_, results) in enumerate(estimates(tree, analysis)):
             if i == 0:
-                line = f"{results.attrs['model']}, {results.attrs['method']}"
-                line += "" if is_exact(results) else f", seed {results.attrs['seed']}"
+                exact = schema.is_exact(results)
+                line = f"{results.attrs['model']}, {'exact' if exact else results.attrs['method']}"
+                line += "" if exact else f", seed {results.attrs['seed']}"
                 screen.print(f"\n[bold]{escape(analysis)}[/bold]: {escape(line)}")
                 screen.print(trust(results))
             if "mode" not in results.dims:
