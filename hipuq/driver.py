@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
 from typing import Any
 
@@ -131,8 +131,18 @@ def run(
     designing, estimating = record.split(options)
     seed = seed_of(rng)
     samples = record.design(inputs, n, seed, **designing)
-    outcomes = evaluate(model, samples, keep=[of], n_jobs=n_jobs, executor=executor, progress=progress)
+    outcomes = evaluate(
+        model, samples, keep=with_bounds([of], model), n_jobs=n_jobs, executor=executor, progress=progress
+    )
     return record.estimate(outcomes, inputs, of=of, rng=spawn(seed, 2**31), **estimating)
+
+
+def with_bounds(of: Iterable[str], model: Callable[..., xr.Dataset]) -> list[str]:
+    """Return outcomes to analyse, and the bounds ``<of>_low``, ``<of>_high`` that a model gives of them."""
+    names = list(of)
+    known = getattr(model, "outcomes", ())
+    bounds = [f"{name}_{end}" for name in names for end in ("low", "high")]
+    return [*names, *(name for name in bounds if name in known)]
 
 
 def _check_inputs(inputs: object) -> None:

@@ -125,14 +125,23 @@ class FrictionIntegrated:
 
     def check(self, samples: xr.Dataset) -> None:
         """Check all samples at once, see `CEAModel.check`."""
-        self._refuse(samples.variables)
+        self._refuse_samples(samples)
         self.model.check(samples)
 
-    def _refuse(self, names: Iterable[object]) -> None:
-        if FRICTION in names:
-            raise InputError(
-                "friction is integrated over its distribution: take it out of inputs and samples"
-            )
+    def _refuse_samples(self, samples: xr.Dataset) -> None:
+        # As a coordinate too friction would be taken to count.
+        self._refuse(
+            [FRICTION] if FRICTION in samples.variables else samples.data_vars, "parameter in samples"
+        )
+
+    def _refuse(self, names: Iterable[object], what: str = "parameter") -> None:
+        """Raise an error for friction, or a name that is no parameter: friction is none to choose."""
+        for name in names:
+            if name == FRICTION:
+                raise InputError(
+                    "friction is integrated over its distribution: take it out of inputs and samples"
+                )
+            check_name(what, str(name), self.parameters)
 
     def __call__(self, samples: xr.Dataset, keep: Iterable[str] | None = None) -> xr.Dataset:
         """Return the outcomes of the samples.
@@ -151,7 +160,7 @@ class FrictionIntegrated:
             the share among the friction whose verdict is known, NaN where none is; a sample of which a
             part of the sweep is not known has the status ``undecided``.
         """
-        self._refuse(samples.variables)
+        self._refuse_samples(samples)
         wanted = [
             check_name("outcome", name, self.outcomes) for name in (self.outcomes if keep is None else keep)
         ]
@@ -206,7 +215,7 @@ class FrictionIntegrated:
         cdf = self.distribution.cdf
         assert cdf is not None
         inner = cells.edges[1:-1]
-        count = cells.unstable.sum(axis=1)
+        count = cells.count
         rises = count[1:] > count[:-1]
         split = cdf(inner + np.where(rises, SIDE, -SIDE) * np.abs(inner)) if inner.size else inner
         first = float(cdf(np.array([np.nextafter(self.lower, -np.inf)]))[0])

@@ -17,7 +17,7 @@ import xarray as xr
 
 from hipuq import __version__, schema
 from hipuq.contact import ContactPatterns
-from hipuq.driver import method_named
+from hipuq.driver import method_named, with_bounds
 from hipuq.errors import HipuqError, InputError, StoreError, StudyError, check_name
 from hipuq.evaluation import evaluate
 from hipuq.friction import FrictionIntegrated, integrate_friction
@@ -183,7 +183,13 @@ def run_study(
         seed = seed_of(np.random.SeedSequence(study.seed, spawn_key=(i,)))
         method = method_named(analysis.method)
         samples = method.design(analysis.inputs, analysis.n, seed, **analysis.design_options)
-        outcomes = evaluate(analysis.model, samples, keep=_kept(analysis), n_jobs=n_jobs, progress=progress)
+        outcomes = evaluate(
+            analysis.model,
+            samples,
+            keep=with_bounds(analysis.of, analysis.model),
+            n_jobs=n_jobs,
+            progress=progress,
+        )
         save_outcomes(outcomes, folder / "outcomes" / f"{analysis.name}.zarr")
         for of in analysis.of:
             groups[f"{analysis.name}/{of}"] = method.estimate(
@@ -197,12 +203,6 @@ def run_study(
             f"{outcomes.attrs['seconds']:.1f} s, {open_:,} undecided"
         )
     return xr.DataTree.from_dict(groups)
-
-
-def _kept(analysis: Analysis) -> list[str]:
-    """Return the outcomes that an analysis needs: those asked for, and the bounds that they have."""
-    bounds = [f"{of}_{end}" for of in analysis.of for end in ("low", "high")]
-    return [*analysis.of, *(name for name in bounds if name in analysis.model.outcomes)]
 
 
 def _at_nominal(analysis: Analysis, report: ReportTable, n_jobs: int | None) -> dict[str, xr.Dataset]:

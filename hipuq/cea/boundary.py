@@ -97,8 +97,12 @@ def _solved(exact: ExactPencil, bracket: Bracket, mechanisms: int) -> tuple[floa
         ratio = Fraction(int(p[mechanisms]), int(p[exact.n]) << (exact.n - mechanisms) * exact.bits)
         return float(ratio), 0.0
 
-    if np.isnan([f0, f1]).any() or not bracket.change[0]:
+    if not np.all(f0 * f1 < 0) or not bracket.change[0]:
         (f0, c0), (f1, c1) = value(float(x0), float(c0), 0.0), value(float(x1), float(c1), 0.0)
+    for x, f, centre in ((x0, f0, c0), (x1, f1, c1)):
+        # An end of the bracket may be the boundary itself.
+        if f == 0:
+            return float(x), float(centre)
     x, centre = float(x0), float(c0)
     for _ in range(100):
         last = x

@@ -43,6 +43,8 @@ class Cells:
     ----------
     edges : (k + 1,) array
         Ends of the cells, ascending, those of the range included [1].
+    count : (k,) array
+        Number of unstable modes in each cell, NaN where that is not known.
     unstable : (k, n) array
         1 where a mode is unstable in a cell, 0 where not, NaN where that is not known.
     boundaries : tuple of Boundary
@@ -50,13 +52,14 @@ class Cells:
     """
 
     edges: Array
+    count: Array
     unstable: Array
     boundaries: tuple[Boundary, ...]
 
     @property
     def any_unstable(self) -> Array:
         """1, 0 or NaN for each cell, (k,)."""
-        return np.where((self.unstable == 1).any(axis=1), 1.0, self.unstable.max(axis=1))
+        return np.minimum(self.count, 1.0)
 
     def intervals(self, verdict: Array) -> Array:
         """Return the intervals in which a verdict is 1, neighbouring cells joined, (m, 2).
@@ -119,7 +122,8 @@ def stability_cells(
     for i, own in enumerate(found):
         parts = [part for j in np.flatnonzero(row == i) for part in pieces[j]]
         at = np.array([part.start for part in parts] + [upper])
-        whole = Cells(at, np.stack([part.unstable for part in parts]), tuple(own or ()))
+        count = np.array([part.count for part in parts])
+        whole = Cells(at, count, np.stack([part.unstable for part in parts]), tuple(own or ()))
         cells.append(_without(whole, unresolved[i]))
     return cells
 
@@ -130,9 +134,10 @@ def _without(cells: Cells, unresolved: Array) -> Cells:
         return cells
     edges = np.union1d(cells.edges, unresolved.clip(cells.edges[0], cells.edges[-1]))
     middle = (edges[:-1] + edges[1:]) / 2
-    unstable = cells.unstable[np.searchsorted(cells.edges, middle) - 1]
+    here = np.searchsorted(cells.edges, middle) - 1
     lost = ((unresolved[:, :1] < middle) & (middle < unresolved[:, 1:])).any(axis=0)
-    return Cells(edges, np.where(lost[:, None], np.nan, unstable), cells.boundaries)
+    count = np.where(lost, np.nan, cells.count[here])
+    return Cells(edges, count, np.where(lost[:, None], np.nan, cells.unstable[here]), cells.boundaries)
 
 
 @dataclass(frozen=True)
@@ -143,6 +148,7 @@ class _Piece:
     start: float
     first: float
     last: float
+    count: float
     unstable: Array
 
 
@@ -217,10 +223,10 @@ def _pieces(
         if pieces and (not by_mode or np.array_equal(pieces[-1].unstable, own)):
             pieces[-1] = replace(pieces[-1], last=x)
         else:
-            pieces.append(_Piece(row, start if not pieces else x, x, x, own))
+            pieces.append(_Piece(row, start if not pieces else x, x, x, float(own.sum()), own))
     # A verdict that contradicts the boundaries shows that one was missed: then nothing is known.
     if not pieces or not (fits | np.isnan(unstable).any(axis=1)).all():
-        return [_Piece(row, start, start, start, np.full(unstable.shape[1], np.nan))]
+        return [_Piece(row, start, start, start, np.nan, np.full(unstable.shape[1], np.nan))]
     return pieces
 
 
@@ -239,7 +245,8 @@ class _Change:
 def _locate(pencils: Pencils, pieces: list[list[_Piece]], growth_threshold: float, finest: float) -> None:
     """Move the starts of pieces to where unstable modes overtake others, in place.
 
-    What lies between two looks that cannot be told becomes a piece of which nothing is known.
+    What lies between two looks that cannot be told becomes a piece of which the number of unstable modes
+    is known, but not which.
     """
     changes = [
         _Change(k, a.last, b.first, a.unstable, b.unstable)

@@ -96,7 +96,8 @@ def _state_space_modes(
     states[:, n:, :n] = -stiffness / np.square(rate)[:, None, None]
     states[:, n:, n:] = -damping / rate[:, None, None]
     values: Complex = np.linalg.eigvals(states).astype(np.complex128)
-    radius = np.broadcast_to((filter_radius or np.inf) * norms(states)[:, None], values.shape)
+    uniform = filter_radius * norms(states)[:, None] if filter_radius else np.inf
+    radius = np.broadcast_to(uniform, values.shape)
     limit = (threshold / rate)[:, None]
     known = np.abs(values.real - limit) > radius
     flagged = np.flatnonzero(~known.all(axis=1))

@@ -20,10 +20,10 @@ from hipuq.cea.pencils import Array, Pencils
 from hipuq.cea.points import Points, Rows, Sweep
 from hipuq.errors import InputError
 
-MOST = 1500
+MOST = 1000
 """Open intervals of one sample at once from which those narrower than `CROWDED` are left unresolved."""
 
-CROWDED = 1e-5
+CROWDED = 1e-4
 """See `MOST`. Parts nearer to each other than this are left as one."""
 
 REACH = 0.02

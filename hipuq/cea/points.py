@@ -121,7 +121,7 @@ class Sweep:
         mechanisms = self.mechanisms[row]
         values: Complex = np.linalg.eigvals(matrices).astype(np.complex128)
         norm = norms(matrices)[:, None]
-        radius = np.broadcast_to((self.filter_radius or np.inf) * norm, values.shape)
+        radius = np.broadcast_to(self.filter_radius * norm if self.filter_radius else np.inf, values.shape)
         _, known = judge(values, radius, ZERO * norm, mechanisms, 0.0)
         unclear = np.flatnonzero(~known.all(axis=1))
         sizes = self.sizes[row[unclear]]

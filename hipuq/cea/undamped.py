@@ -118,7 +118,7 @@ def judged_roots(
     """Return the roots w, which of them are mechanisms, of which the verdict is known, and by which path."""
     values: Complex = np.linalg.eigvals(stiffness).astype(np.complex128)
     norm = norms(stiffness)[:, None]
-    uniform = np.broadcast_to((filter_radius or np.inf) * norm, values.shape)
+    uniform = np.broadcast_to(filter_radius * norm if filter_radius else np.inf, values.shape)
     rigid, known = judge(values, uniform, ZERO * norm, mechanisms, threshold)
     roots = Roots(values, rigid, known, np.full(len(values), DOUBLE, np.int8))
     if certify == ALWAYS:

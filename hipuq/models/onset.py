@@ -89,7 +89,7 @@ def unstable_friction(
 
 def _values(cells: Cells) -> dict[str, Any]:
     """Return the columns of the table."""
-    count = cells.unstable.sum(axis=1)
+    count = cells.count
     starts = cells.edges[:-1]
     above = [count[np.searchsorted(starts, one.friction, side="right") - 1] for one in cells.boundaries]
     ends = cells.intervals(cells.any_unstable)
