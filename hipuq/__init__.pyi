@@ -7,7 +7,7 @@ from .driver import estimate as estimate
 from .driver import run as run
 from .errors import HipuqError as HipuqError
 from .evaluation import evaluate as evaluate
-from .friction import fragility as fragility
+from .fragility_curve import fragility as fragility
 from .friction import integrate_friction as integrate_friction
 from .inputs import Inputs as Inputs
 from .models.onset import unstable_friction as unstable_friction

@@ -345,7 +345,9 @@ def test_outcomes_survive_the_disk(tmp_path, k3):
     xr.testing.assert_identical(hipuq.load_outcomes(tmp_path / "outcomes.zarr").load(), found)
 
 
-@pytest.mark.parametrize("distribution", [cp.Normal(0.4, 0.1), stats.norm(0.4, 0.1), Mixture()], ids=["chaospy", "scipy", "own"])
+@pytest.mark.parametrize(
+    "distribution", [cp.Normal(0.4, 0.1), stats.norm(0.4, 0.1), Mixture()], ids=["chaospy", "scipy", "own"]
+)
 def test_options_say_what_was_integrated(distribution):
     exact = hipuq.integrate_friction(HOFFMANN, distribution)
     options = json.loads(json.dumps(exact.options))

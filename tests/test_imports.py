@@ -33,6 +33,7 @@ ORDER = [
     ["evaluation"],
     ["intervals"],
     ["friction"],
+    ["fragility_curve"],
     ["methods"],
     ["driver"],
     ["comparison"],

@@ -1,0 +1,104 @@
+"""Fragility: the probability of instability at each friction, over all else that is uncertain."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from hipuq import schema
+from hipuq.errors import InputError, SchemaError
+from hipuq.inputs import Inputs
+from hipuq.intervals import check_confidence, wilson
+
+Array = NDArray[np.float64]
+
+
+def fragility(outcomes: xr.Dataset, friction: ArrayLike, *, confidence: float = 0.95) -> xr.Dataset:
+    """Return the fragility curve: the probability of instability at each friction, over what was sampled.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+        Of a model whose friction is integrated, with ``interval``; as from `evaluate`.
+    friction : (k,) array
+        Where to give it, inside the range that was swept [1].
+    confidence : float, default 0.95
+        Level of the intervals, of Wilson; samples of a stratified design count by their weights.
+
+    Returns
+    -------
+    Dataset
+        ``probability``, ``probability_low``, ``probability_high`` and ``known`` over ``friction``. A
+        sample that is undecided counts as stable in the lower limit and as unstable in the upper one.
+        Where every level of a discrete input comes once and nothing else is uncertain, limits are
+        bounds by what is unknown alone.
+
+    Raises
+    ------
+    SchemaError
+        If the outcomes have no intervals.
+    InputError
+        If a friction is outside the range that was swept, or the confidence is not one.
+    """
+    confidence = check_confidence(confidence)
+    if "interval" not in outcomes.variables or "range" not in outcomes["interval"].attrs:
+        raise SchemaError("the outcomes have no 'interval': evaluate a model made by integrate_friction")
+    lower, upper = outcomes["interval"].attrs["range"]
+    grid = np.atleast_1d(np.asarray(friction, dtype=np.float64))
+    if grid.ndim != 1 or not ((grid >= lower) & (grid <= upper)).all() or (np.diff(grid) <= 0).any():
+        raise InputError(
+            f"friction is {grid}: it must ascend within the range that was swept, {lower} to {upper}"
+        )
+    known = outcomes["status"].values == schema.STATUS["ok"]
+    weight = outcomes["weight"].values if "weight" in outcomes.coords else np.ones(len(known))
+    weight = weight / weight.sum()
+    unstable = _covered(outcomes["interval"].values[known], weight[known], grid, (lower, upper))
+    unknown = weight[~known].sum()
+    limits = [unstable, unstable + unknown]
+    drawn = not _enumerated(outcomes)
+    if drawn:
+        # Samples of unequal weight tell as much as this many of equal weight (Kish).
+        size = np.full(grid.size, 1.0 / np.square(weight).sum())
+        limits = [wilson(share * size, size, confidence)[end] for end, share in enumerate(limits)]
+    values = {
+        "probability": unstable / (1 - unknown) if known.any() else np.full(grid.size, np.nan),
+        "probability_low": limits[0],
+        "probability_high": limits[1],
+    }
+    what = "probability of instability"
+    data: dict[str, Any] = {
+        name: ("friction", value, {"long_name": what + text, "units": "1"})
+        for (name, value), text in zip(values.items(), ("", ", lower limit", ", upper limit"), strict=True)
+    }
+    data["known"] = ((), int(known.sum()), {"long_name": "samples with a known verdict", "units": "1"})
+    curve = xr.Dataset(data, coords={"friction": ("friction", grid, schema.PARAMETERS["friction"].attrs)})
+    curve = schema.stamp(curve, f"fragility at {grid.size} frictions", like=outcomes.attrs)
+    return curve.assign_attrs(confidence=confidence if drawn else 1.0)
+
+
+def _enumerated(outcomes: xr.Dataset) -> bool:
+    """Say whether outcomes are those of every level of a discrete input once, so that none was drawn."""
+    if "weight" not in outcomes.coords or not outcomes.attrs.get("inputs"):
+        return False
+    inputs = Inputs.from_json(str(outcomes.attrs["inputs"]))
+    whole = np.isclose(float(outcomes["weight"].sum()), 1.0, rtol=0, atol=1e-9)
+    return bool(whole and set(inputs) <= set(inputs.discrete))
+
+
+def _covered(intervals: Array, weight: Array, grid: Array, swept: tuple[float, float]) -> Array:
+    """Return the weight of the samples that have an interval about each place of a grid, (k,).
+
+    A boundary is stable, but an end of the range that was swept is none.
+    """
+    lower, upper = swept
+    start, end = intervals[..., 0], intervals[..., 1]
+    first = np.searchsorted(grid, np.where(start == lower, -np.inf, start), side="right")
+    last = np.searchsorted(grid, np.where(end == upper, np.inf, end), side="left")
+    weights = np.broadcast_to(weight[:, None], start.shape).ravel()
+    change = (np.bincount(at.ravel(), weights, grid.size + 2) for at in (first, last))
+    opened, closed = change
+    covered: Array = np.cumsum(opened - closed)[: grid.size]
+    return np.clip(covered, 0.0, 1.0)
