@@ -20,8 +20,21 @@ def meetings(constant: np.ndarray, slope: np.ndarray, lower: float, upper: float
     # The coefficient of w**k has at most the degree of rank, and the discriminant is homogeneous of
     # degree 2n - 2 in the coefficients.
     degree = min(n * (n - 1), one.rank() * (2 * n - 2))
-    values = [(zero + t * one).charpoly().discriminant() for t in range(degree + 1)]
+    values = [_discriminant((zero + t * one).charpoly().coeffs()) for t in range(degree + 1)]
     return _sign_changes(values, lower, upper)
+
+
+def _discriminant(coefficients: list[flint.fmpz]) -> flint.fmpz:
+    """Return the discriminant of a monic polynomial: the determinant of the power sums of its roots."""
+    n = len(coefficients) - 1
+    e = coefficients[::-1]  # 1, then the coefficients from the second highest down
+    sums = [flint.fmpz(n)]
+    for k in range(1, 2 * n - 1):
+        # Newton's identities.
+        total = k * e[k] if k <= n else flint.fmpz(0)
+        total += sum((e[i] * sums[k - i] for i in range(1, min(k - 1, n) + 1)), start=flint.fmpz(0))
+        sums.append(-total)
+    return flint.fmpz_mat(n, n, [sums[i + j] for i in range(n) for j in range(n)]).det()
 
 
 def zeros(
