@@ -80,12 +80,12 @@ def fragility(outcomes: xr.Dataset, friction: ArrayLike, *, confidence: float = 
 
 
 def _enumerated(outcomes: xr.Dataset) -> bool:
-    """Say whether outcomes are those of every level of a discrete input once, so that none was drawn."""
+    """Say whether outcomes are those of every level of a discrete input alike, so that none was drawn."""
     if "weight" not in outcomes.coords or not outcomes.attrs.get("inputs"):
         return False
     inputs = Inputs.from_json(str(outcomes.attrs["inputs"]))
-    whole = np.isclose(float(outcomes["weight"].sum()), 1.0, rtol=0, atol=1e-9)
-    return bool(whole and set(inputs) <= set(inputs.discrete))
+    times = float(outcomes["weight"].sum())
+    return bool(abs(times - round(times)) < 1e-9 and set(inputs) <= set(inputs.discrete))
 
 
 def _covered(intervals: Array, weight: Array, grid: Array, swept: tuple[float, float]) -> Array:

@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 TAIL = 1e-9
 """Probability that is cut off at an end of the support that is infinite."""
 
+LARGEST = 1e3
+"""Largest modulus of friction that is swept; beyond it the elastic part of the matrix drowns in rounding."""
+
 FRICTION = "friction"
 
 
@@ -78,8 +81,8 @@ def integrate_friction(model: CEAModel, distribution: object) -> FrictionIntegra
 class FrictionIntegrated:
     """A model without the parameter friction, made by `integrate_friction`.
 
-    The sweep covers the support of the distribution; an infinite end is cut where `TAIL` of the
-    probability is left, which goes into the bounds ``probability_low`` and ``probability_high``. A
+    The sweep covers the support of the distribution up to `LARGEST`; an infinite end is cut where `TAIL`
+    of the probability is left. What is cut off goes into the bounds ``probability_low`` and ``_high``. A
     boundary itself is stable, and so is an atom of the distribution within 1e-12 of it, relatively.
 
     Attributes
@@ -228,9 +231,9 @@ class FrictionIntegrated:
         cdf = self.distribution.cdf
         assert cdf is not None
         ends = np.array([self.lower, self.upper])
-        reach = SIDE * np.abs(ends)
-        atom = cdf(ends) - cdf(np.nextafter(ends - [0.0, reach[1]], -np.inf)) > TAIL
-        low, high = ends + np.where(atom, 2 * reach, 0.0) * [-1.0, 1.0]
+        reach = SIDE * np.abs(ends).max()
+        atom = cdf(ends) - cdf(np.nextafter(ends - [0.0, reach], -np.inf)) > TAIL
+        low, high = ends + np.where(atom, 4 * reach, 0.0) * [-1.0, 1.0]
         return float(low), float(high)
 
 
@@ -258,8 +261,15 @@ def _range(distribution: Distribution) -> tuple[float, float]:
         lower = float(distribution.ppf(np.array([TAIL]))[0])
     if not np.isfinite(upper):
         upper = float(distribution.ppf(np.array([1.0 - TAIL]))[0])
+    first = float(distribution.ppf(np.array([TAIL]))[0])
+    assert distribution.cdf is not None
+    if first > lower and float(distribution.cdf(np.array([(lower + first) / 2]))[0]) == 0:
+        # The support of a discrete distribution may begin a step below its first value.
+        lower = first
+    lower, upper = max(lower, -LARGEST), min(upper, LARGEST)
     if not (np.isfinite([lower, upper]).all() and lower < upper):
         raise InputError(
-            f"the distribution of friction reaches from {lower} to {upper}: nothing to integrate over"
+            f"the distribution of friction covers {lower:g} to {upper:g} of what can be swept, at most "
+            f"{-LARGEST:g} to {LARGEST:g}: nothing to integrate over"
         )
     return lower, upper

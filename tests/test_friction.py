@@ -284,7 +284,7 @@ def test_what_cannot_be_integrated_is_named():
             hipuq.integrate_friction(model, uniform)
     with pytest.raises(InputError, match="has no cdf"):
         hipuq.integrate_friction(HOFFMANN, WithoutCdf())
-    with pytest.raises(InputError, match=r"from 1\.0 to 1\.0: nothing to integrate over"):
+    with pytest.raises(InputError, match="covers 1 to 1 of what can be swept"):
         hipuq.integrate_friction(HOFFMANN, cp.DiscreteUniform(1, 1))
     for value in (0.3, cp.J(cp.Uniform(), cp.Uniform()), hipuq.relative(cp.Uniform(0, 1))):
         with pytest.raises(InputError, match="distribution of friction is"):
@@ -450,3 +450,30 @@ def test_without_an_input_of_its_own_a_mirror_is_no_symmetry():
     contact = np.array([[0, 1, 1, 1, 1, 1, 1, 1, 1], [1, 1, 1, 1, 1, 1, 1, 1, 0]])
     left, right = exact(exact.nominal(contact=contact), ["probability"])["probability"].values
     assert abs(left - right) > 1e-6
+
+
+def test_heavy_tails_and_discrete_supports():
+    """What cannot be swept widens the bounds; a discrete distribution begins at its first value."""
+    heavy = hipuq.integrate_friction(HOFFMANN, stats.levy(scale=0.1))
+    found = hipuq.evaluate(heavy, HOFFMANN.nominal().drop_vars("friction", errors="ignore"), progress=False)
+    low, high = (float(found[f"probability_{end}"][0]) for end in ("low", "high"))
+    assert heavy.upper == 1e3
+    truth = stats.levy(scale=0.1).sf(published.HOFFMANN_ONSET)
+    # Unstable from the onset on, also where it is not swept.
+    assert high == pytest.approx(truth, rel=1e-10)
+    assert low == pytest.approx(truth - stats.levy(scale=0.1).sf(1e3), rel=1e-10)
+    coin = hipuq.integrate_friction(HOFFMANN, stats.binom(1, 0.5))
+    assert (coin.lower, coin.upper) == (0.0, 1.0)
+    assert float(hipuq.evaluate(coin, coin.nominal(), progress=False)["probability"][0]) == 0.5
+
+
+def test_a_support_that_ends_at_a_boundary():
+    """The boundary is none inside the range: stable up to it, unstable from it on."""
+    ((one,),) = boundaries(HOFFMANN.pencils(HOFFMANN.nominal()), 0.0, 0.8)
+    for low, high, expected in ((0.0, one.friction, 0.0), (one.friction, 0.8, 1.0)):
+        model = hipuq.integrate_friction(HOFFMANN, cp.Uniform(low, high))
+        found = hipuq.evaluate(model, model.nominal(), progress=False)
+        assert float(found["probability"][0]) == expected
+        # chaospy rounds the end of its support.
+        assert float(found["onset"][0]) == pytest.approx(one.friction if expected else np.inf, rel=1e-15)
+        assert int(found["status"][0]) == 0

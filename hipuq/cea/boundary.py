@@ -49,6 +49,12 @@ class Boundary:
     certified: bool
 
 
+def inside(found: list[Boundary], lower: float, upper: float) -> list[Boundary]:
+    """Return the boundaries of a range, without those at its ends to within what is solved for."""
+    reach = SIDE * max(abs(lower), abs(upper))
+    return [one for one in found if lower + reach < one.friction < upper - reach]
+
+
 def proved(sweep: Sweep, brackets: list[Bracket]) -> list[list[Boundary]]:
     """Solve for the boundaries in brackets and prove them.
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.boundary import Boundary
+from hipuq.cea.boundary import Boundary, inside
 from hipuq.cea.damped_onset import damped_boundaries
 from hipuq.cea.onset import check_range, search
 from hipuq.cea.pencils import Array, Pencils
@@ -28,8 +28,11 @@ Mask = NDArray[np.bool_]
 BLOCK = 1024
 """Frictions looked at together."""
 
-LOOKS = 17
-"""Places in each cell between which a mode that overtakes another is seen."""
+LOOKS = 9
+"""Places at which each cell is looked at."""
+
+LOOKS_BY_MODE = 33
+"""The same where modes are told apart: one that overtakes another twice between two of them is not seen."""
 
 FINEST = 1e-10
 """Width to which an overtaking is located, as part of the range."""
@@ -106,7 +109,7 @@ def stability_cells(
     edges = [np.array([lower, *(one.friction for one in own or ()), upper]) for own in found]
     row = np.repeat(np.arange(len(edges)), [len(own) - 1 for own in edges])
     start, end = (np.concatenate([own[part] for own in edges]) for part in (slice(-1), slice(1, None)))
-    looks = _looks(LOOKS if by_mode else 2)
+    looks = _looks(LOOKS_BY_MODE if by_mode else LOOKS)
     friction = start[:, None] + (end - start)[:, None] * looks
     unstable = _unstable(pencils, np.repeat(row, len(looks)), friction.ravel(), growth_threshold)
     unstable = unstable.reshape(*friction.shape, -1)
@@ -167,6 +170,7 @@ def _all_boundaries(
         own = pencils.rows(rows)
         if damped[rows].any():
             parts = damped_boundaries(own, lower, upper, growth_threshold)
+            parts = [inside(part, lower, upper) for part in parts]
         else:
             both = search(replace(own, damping=None), lower, upper)
             parts = both.boundaries

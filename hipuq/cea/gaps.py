@@ -24,6 +24,16 @@ NARROWEST = 3e-8
 PARABOLIC = 16 * NARROWEST
 """Width of an interval up to which the parabola through three squared gaps tells how wide a window is."""
 
+CLEAR = 16.0
+"""How many times its second difference a gap must stay, in intervals wider than COARSE, to be cleared: over
+a wide one the curvature of the roots can hide from three points that two of them cross."""
+
+CLEAR_NARROW = 1.0
+"""The same in narrower intervals, where roots are nearly straight."""
+
+COARSE = 1e-4
+"""See CLEAR."""
+
 STRAIGHT = 0.25
 """Second difference of a squared gap, over its first, below which it passes through zero only once."""
 
@@ -60,8 +70,8 @@ class Bracket:
 def vanishing(points: Triple) -> tuple[Mask, Array]:
     """Say which intervals may hold a zero of a squared gap, though no count differs at their points.
 
-    A gap that stays larger than its second difference, or whose square does, cannot vanish: the
-    gap is smooth where two real roots cross without coupling, its square where they merge. Both are
+    A gap that stays well above its second difference, or whose square does, does not vanish: the gap
+    is smooth where two real roots cross without coupling, its square where they merge. Both are
     so only while no third root comes near, so the gaps between all roots must pass, complex ones too.
 
     Parameters
@@ -78,12 +88,13 @@ def vanishing(points: Triple) -> tuple[Mask, Array]:
     """
     a, m, b = points
     width = (b.friction - a.friction)[:, None]
+    factor = np.where(width > COARSE, CLEAR, CLEAR_NARROW)
     gap = np.stack([np.diff(point.real, axis=1) for point in points])
     squared = np.square(gap)
     paired = np.stack([_matched(point.pairs, m.pairs) for point in points])
     roots = np.abs(np.stack([point.real for point in points]))
     every = _packed(np.stack([point.real for point in points]), paired)
-    sure = [_stays(np.square(paired.imag)), _stays(roots)]
+    sure = [_stays(np.square(paired.imag), factor), _stays(roots, factor)]
     # Parabola of the squared gap over -1, 0, 1: c t^2 + s t + e, lowest at t = -s / 2c.
     c = (squared[0] - 2 * squared[1] + squared[2]) / 2
     s = (squared[2] - squared[0]) / 2
@@ -91,7 +102,9 @@ def vanishing(points: Triple) -> tuple[Mask, Array]:
     t = np.divide(-s, 2 * c, out=np.zeros_like(s), where=bowl)
     depth = np.square(t) - np.divide(squared[1], c, out=np.zeros_like(s), where=bowl)
     window = np.sqrt(np.maximum(depth, 0.0)) * width
-    clear = _stays(gap) | _stays(squared) | ((width <= PARABOLIC) & bowl & (window < NARROWEST))
+    clear = (
+        _stays(gap, factor) | _stays(squared, factor) | ((width <= PARABOLIC) & bowl & (window < NARROWEST))
+    )
     low = np.where(~clear & bowl, squared[1] - c * np.square(t), np.inf)
     if not low.shape[1]:
         # A single root has no gap.
@@ -99,7 +112,7 @@ def vanishing(points: Triple) -> tuple[Mask, Array]:
     k = np.argmin(low, axis=1)
     rows = np.arange(len(k))
     vertex = np.where(np.isfinite(low[rows, k]), m.friction + t[rows, k] * width[:, 0] / 2, np.nan)
-    sure += [_stays(part) | _stays(np.square(part)) for part in _differences(every)]
+    sure += [_stays(part, factor) | _stays(np.square(part), factor) for part in _differences(every)]
     return ~(clear.all(axis=1) & np.all(np.concatenate(sure, axis=1), axis=1)), vertex
 
 
@@ -120,10 +133,10 @@ def _differences(roots: Complex) -> Iterator[Complex]:
         yield part
 
 
-def _stays(values: Array | Complex) -> Mask:
-    """Say whether values at three points stay larger than their second difference; NaN do."""
+def _stays(values: Array | Complex, factor: Array) -> Mask:
+    """Say whether values at three points stay larger than factor times their second difference; NaN do."""
     bend = np.abs(values[0] - 2 * values[1] + values[2])
-    return np.asarray((np.abs(values).min(axis=0) > bend) | np.isnan(bend))
+    return np.asarray((np.abs(values).min(axis=0) > factor * bend) | np.isnan(bend))
 
 
 def _matched(pairs: Complex, reference: Complex) -> Complex:

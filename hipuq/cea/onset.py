@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hipuq.cea.boundary import Boundary, proved
+from hipuq.cea.boundary import Boundary, inside, proved
 from hipuq.cea.gaps import NARROWEST, PARABOLIC, Bracket, Mask, Triple, crossing, unresolved, vanishing
 from hipuq.cea.pencils import Array, Pencils
 from hipuq.cea.points import Points, Rows, Sweep
@@ -105,7 +105,7 @@ def search(pencils: Pencils, lower: float, upper: float) -> Search:
         raise InputError("boundaries are found for undamped pencils only: damping must be zero")
     sweep = Sweep(pencils, max(abs(lower), abs(upper)))
     brackets, unresolved = _brackets(sweep, lower, upper)
-    return Search(proved(sweep, brackets), unresolved)
+    return Search([inside(own, lower, upper) for own in proved(sweep, brackets)], unresolved)
 
 
 def check_range(lower: float, upper: float) -> None:
@@ -115,10 +115,14 @@ def check_range(lower: float, upper: float) -> None:
 
 
 def start_grid(lower: float, upper: float) -> Array:
-    """Return the frictions at which pencils are looked at first: evenly, but by factors beyond 1."""
-    if upper <= 1 or lower >= 1:
-        return np.linspace(lower, upper, GRID)
-    return np.concatenate([np.linspace(lower, 1.0, GRID), np.geomspace(1.0, upper, GRID)[1:]])
+    """Return the frictions at which pencils are looked at first: evenly, but by factors beyond 1 and -1."""
+    low, high = min(max(lower, -1.0), upper), max(min(upper, 1.0), lower)
+    parts = [np.linspace(low, high, GRID)] if low < high else [np.array([low])]
+    if lower < low:
+        parts.insert(0, -np.geomspace(-lower, max(-low, -lower * 1e-3), GRID)[:-1])
+    if upper > high:
+        parts.append(np.geomspace(max(high, upper * 1e-3), upper, GRID)[1:])
+    return np.unique(np.concatenate([[lower, upper], *parts]))
 
 
 def _brackets(sweep: Sweep, lower: float, upper: float) -> tuple[list[Bracket], list[Array]]:
