@@ -28,7 +28,7 @@ CLEAR = 16.0
 """How many times its second difference a gap must stay, in intervals wider than COARSE, to be cleared: over
 a wide one the curvature of the roots can hide from three points that two of them cross."""
 
-CLEAR_NARROW = 1.0
+CLEAR_NARROW = 2.0
 """The same in narrower intervals, where roots are nearly straight."""
 
 COARSE = 1e-4
