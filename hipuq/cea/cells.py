@@ -192,7 +192,7 @@ def _all_boundaries(
 
 
 def _looks(count: int) -> Array:
-    """Return places in a cell of length 1, denser towards its ends, none in its middle if even."""
+    """Return places in a cell of length 1, denser towards its ends."""
     places: Array = (1 - np.cos(np.pi * (np.arange(count) + 0.5) / count)) / 2
     return places
 

@@ -15,23 +15,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.boundary import Boundary
+from hipuq.cea.boundary import SIDE, Boundary
 from hipuq.cea.bounds import Complex
 from hipuq.cea.crossing import Expansion, expansion, passing
+from hipuq.cea.gaps import NARROWEST
 from hipuq.cea.growing import Sides, exact_sides
 from hipuq.cea.mechanisms import without_mechanisms
 from hipuq.cea.newton import Crossing, solve_crossing
 from hipuq.cea.numbering import TIE, mode_order
-from hipuq.cea.onset import check_range
+from hipuq.cea.onset import boundaries, check_range
 from hipuq.cea.pencils import Array, Pencils
 from hipuq.cea.windows import pair_crossings
 from hipuq.errors import InputError
 
 GRID = 16
 """Intervals of friction at which every pencil is looked at first."""
-
-NARROWEST = 3e-8
-"""Intervals of friction are not divided below this: narrower windows are not looked for."""
 
 MOST = 3000
 """Open intervals of one pencil at once: more mean that a mode stays on the threshold."""
@@ -44,9 +42,6 @@ CHUNK = 512
 
 Found = tuple[int, Crossing, int]
 """Sample, crossing and whether it leads out of (1) or back into (-1) stability."""
-
-SIDE = 1e-12
-"""Relative distance from a boundary at which the eigenvalues on both its sides are enclosed."""
 
 
 def damped_boundaries(
@@ -137,8 +132,6 @@ def _all_crossings(family: _Family, pencils: Pencils, lower: float, upper: float
     """Return the crossings inside the range; of undamped pencils within their windows of flutter."""
     if family.damped:
         return _crossings(family, np.arange(len(family.samples)), lower, upper)
-    from hipuq.cea.onset import boundaries
-
     found, rest = [], []
     undamped = replace(pencils.rows(family.samples), damping=None)
     for i, own in enumerate(boundaries(undamped, lower, upper)):

@@ -191,8 +191,7 @@ def crossing(points: Triple) -> tuple[list[Bracket | None], Array]:
         zero[i] = _secant(points, values[:, i], i)
         if pairs[0, i] != pairs[2, i] and not _isolated(rest, values[:, i], centre[:, i], i):
             continue
-        first = 0 if (values[0, i] < 0) != (values[1, i] < 0) else 1
-        ends = [first, first + 1]
+        ends = _change_of_sign(values[:, i])
         found[i] = Bracket(
             int(points[0].row[i]),
             np.array([points[j].friction[i] for j in ends]),
@@ -205,10 +204,15 @@ def crossing(points: Triple) -> tuple[list[Bracket | None], Array]:
 
 def _secant(points: Triple, values: Array, i: int) -> float:
     """Return where the line through the two values of different sign is zero."""
-    first = 0 if (values[0] < 0) != (values[1] < 0) else 1
-    x0, x1 = (float(points[j].friction[i]) for j in (first, first + 1))
-    f0, f1 = values[first : first + 2]
+    ends = _change_of_sign(values)
+    x0, x1 = (float(points[j].friction[i]) for j in ends)
+    f0, f1 = values[ends]
     return float((x0 * f1 - x1 * f0) / (f1 - f0))
+
+
+def _change_of_sign(values: Array) -> list[int]:
+    """Return which two neighbours of three values differ in sign."""
+    return [0, 1] if (values[0] < 0) != (values[1] < 0) else [1, 2]
 
 
 def _isolated(rest: list[Points], values: Array, centre: Array, i: int) -> bool:

@@ -19,13 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hipuq.cea.bounds import Complex
+from hipuq.cea.gaps import NARROWEST
 from hipuq.cea.pencils import Array
 
 GRID = 33
 """Frictions at which every window is looked at first."""
-
-NARROWEST = 3e-8
-"""Intervals of friction are not halved below this: narrower windows are not looked for."""
 
 STRAIGHT = 0.25
 """A curve passes zero once if its second difference is at most this part of its change."""
