@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from typing import Any
 
 import xarray as xr
 
 from hipuq.errors import InputError, check_name
-from hipuq.evaluation import evaluate
+from hipuq.evaluation import evaluate, together
 from hipuq.inputs import Inputs
 from hipuq.methods import METHODS, Method
 from hipuq.sampling import Seed, seed_of, spawn
@@ -73,7 +73,7 @@ def estimate(
     of : str
         Name of the outcome to analyse.
     rng : int or Generator, optional
-        Seed of resampling, where the method does any; by default from the design's.
+        Seed of what the method draws, if anything; by default it follows from the design's.
     **options
         Options of the method's estimate.
 
@@ -128,13 +128,72 @@ def run(
     """
     _check_inputs(inputs)
     record = method_named(method)
-    designing, estimating = record.split(options)
-    seed = seed_of(rng)
-    samples = record.design(inputs, n, seed, **designing)
-    outcomes = evaluate(
-        model, samples, keep=with_bounds([of], model), n_jobs=n_jobs, executor=executor, progress=progress
+    stages = record.split(options)
+    outcomes = completed(
+        model,
+        inputs,
+        record,
+        n,
+        seed_of(rng),
+        of=[of],
+        stages=stages,
+        n_jobs=n_jobs,
+        executor=executor,
+        progress=progress,
     )
-    return record.estimate(outcomes, inputs, of=of, rng=spawn(seed, 2**31), **estimating)
+    return record.estimate(outcomes, inputs, of=of, **stages["estimate"])
+
+
+def completed(
+    model: Callable[..., xr.Dataset],
+    inputs: Inputs,
+    record: Method,
+    n: int,
+    seed: int,
+    *,
+    of: Sequence[str],
+    stages: Mapping[str, Mapping[str, Any]],
+    n_jobs: int | None = None,
+    executor: Executor | None = None,
+    progress: bool | None = None,
+) -> xr.Dataset:
+    """Design and evaluate, and what a sequential method then still wants, round after round.
+
+    Parameters
+    ----------
+    model : callable
+    inputs : Inputs
+    record : Method
+    n : int
+        Size of the design.
+    seed : int
+        Seed of the design; round k draws from ``spawn(seed, k)``.
+    of : list of str
+        Outcomes to analyse; the first one is what a sequential method looks at.
+    stages : mapping
+        Options by stage, as from `Method.split`.
+    n_jobs, executor, progress
+        As in `evaluate`.
+
+    Returns
+    -------
+    Dataset
+        Outcomes of all rounds.
+    """
+
+    def evaluated(samples: xr.Dataset) -> xr.Dataset:
+        keep = with_bounds(of, model)
+        return evaluate(model, samples, keep=keep, n_jobs=n_jobs, executor=executor, progress=progress)
+
+    outcomes = evaluated(record.design(inputs, n, seed, **stages["design"]))
+    number = 1
+    while record.refine is not None:
+        more = record.refine(outcomes, inputs, spawn(seed, number), of=of[0], **stages["refine"])
+        if more is None:
+            break
+        outcomes = together(outcomes, evaluated(more))
+        number += 1
+    return outcomes
 
 
 def with_bounds(of: Iterable[str], model: Callable[..., xr.Dataset]) -> list[str]:

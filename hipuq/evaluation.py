@@ -190,6 +190,39 @@ def _joined(parts: list[xr.Dataset]) -> xr.Dataset:
     return xr.Dataset(data, coords=coords)
 
 
+def together(first: xr.Dataset, more: xr.Dataset) -> xr.Dataset:
+    """Return outcomes of two rounds of one analysis as one.
+
+    Parameters
+    ----------
+    first, more : Dataset
+        Outcomes of the same model; bookkeeping that only the first one has is missing (NaN) in the rest.
+
+    Returns
+    -------
+    Dataset
+        With the attributes of the first one and the seconds of both.
+    """
+    variables: dict[Any, Any] = {}
+    for name, values in first.variables.items():
+        if "sample" not in values.dims:
+            variables[name] = values
+            continue
+        axis = values.dims.index("sample")
+        if name in more.variables:
+            rest = more[name].transpose(*values.dims).values
+        else:
+            shape = list(values.shape)
+            shape[axis] = more.sizes["sample"]
+            rest = np.full(shape, np.nan)
+        arrays = _padded([values.values, rest], axis)
+        variables[name] = (values.dims, np.concatenate(arrays, axis), values.attrs)
+    data = {name: values for name, values in variables.items() if name in first.data_vars}
+    coords = {name: values for name, values in variables.items() if name in first.coords}
+    seconds = sum(float(part.attrs.get("seconds", np.nan)) for part in (first, more))
+    return xr.Dataset(data, coords, first.attrs).assign_attrs(seconds=seconds)
+
+
 def _padded(arrays: list[NDArray[Any]], axis: int) -> list[NDArray[Any]]:
     """Return float arrays made equally long but for one axis, with NaN: blocks may need different lengths."""
     shape = np.max([array.shape for array in arrays], axis=0)

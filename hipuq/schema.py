@@ -120,6 +120,11 @@ COORDINATES: dict[str, Variable] = {
     "in_contact": Variable("oscillators in contact"),
     "weight": Variable("probability of the level"),
     "replicate": Variable("replicate of the design"),
+    "round": Variable("round of a sequential method"),
+    "stratum": Variable("use of the sample: -1 to fit, 0 held out, from 1 a stratum of the correction"),
+    "stratum_weight": Variable("probability that the stratum holds"),
+    "quadrature_weight": Variable("weight of the quadrature node"),
+    "budget": Variable("evaluations", dims=("budget",)),
 }
 """Coordinates and dims."""
 

@@ -17,7 +17,7 @@ import xarray as xr
 
 from hipuq import __version__, schema
 from hipuq.contact import ContactPatterns
-from hipuq.driver import method_named, with_bounds
+from hipuq.driver import completed, method_named
 from hipuq.errors import HipuqError, InputError, StoreError, StudyError, check_name
 from hipuq.evaluation import evaluate
 from hipuq.friction import FrictionIntegrated, integrate_friction
@@ -49,8 +49,8 @@ class Analysis:
         Size of the design.
     of : tuple of str
         Outcomes to analyse.
-    design_options, estimate_options : mapping
-        Options of the method's two stages.
+    options : mapping
+        Options of the method by stage.
     evaluations : int
         Model runs that it takes.
     """
@@ -61,8 +61,7 @@ class Analysis:
     method: str
     n: int
     of: tuple[str, ...]
-    design_options: Mapping[str, Any]
-    estimate_options: Mapping[str, Any]
+    options: Mapping[str, Mapping[str, Any]]
     evaluations: int
 
 
@@ -182,18 +181,21 @@ def run_study(
         # Each analysis has its own stream, so that one more at the end changes no other.
         seed = seed_of(np.random.SeedSequence(study.seed, spawn_key=(i,)))
         method = method_named(analysis.method)
-        samples = method.design(analysis.inputs, analysis.n, seed, **analysis.design_options)
-        outcomes = evaluate(
+        outcomes = completed(
             analysis.model,
-            samples,
-            keep=with_bounds(analysis.of, analysis.model),
+            analysis.inputs,
+            method,
+            analysis.n,
+            seed,
+            of=analysis.of,
+            stages=analysis.options,
             n_jobs=n_jobs,
             progress=progress,
         )
         save_outcomes(outcomes, folder / "outcomes" / f"{analysis.name}.zarr")
         for of in analysis.of:
             groups[f"{analysis.name}/{of}"] = method.estimate(
-                outcomes, analysis.inputs, of=of, rng=seed, **analysis.estimate_options
+                outcomes, analysis.inputs, of=of, **analysis.options["estimate"]
             )
         groups |= _at_nominal(analysis, study.report, n_jobs)
         save_results(xr.DataTree.from_dict(groups), folder / RESULTS_NAME)
@@ -246,14 +248,12 @@ def _analysis(table: StudyFile, name: str) -> Analysis:
     model = base if not entry.integrate_friction else _integrated(base, given)
     inputs = model.inputs(**given)
     method: Method = method_named(entry.method)
-    designing, estimating = method.split(entry.options)
+    options = method.split(entry.options)
     for of in entry.of:
         check_name("outcome in of", of, model.outcomes)
-    evaluations = method.evaluations(inputs, entry.n, **designing)
+    evaluations = method.evaluations(inputs, entry.n, **options["evaluations"])
     _check_report(table.report, base)
-    return Analysis(
-        name, model, inputs, entry.method, entry.n, tuple(entry.of), designing, estimating, evaluations
-    )
+    return Analysis(name, model, inputs, entry.method, entry.n, tuple(entry.of), options, evaluations)
 
 
 def _integrated(model: CEAModel, inputs: dict[str, object]) -> FrictionIntegrated:

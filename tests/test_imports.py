@@ -120,7 +120,7 @@ def test_registries_agree_with_their_folders():
     """A method is a file of its own name; every file of models gives something to the registry."""
     for name, method in METHODS.items():
         assert method.design.__module__ == method.estimate.__module__ == f"hipuq.methods.{name}"
-    shared = {"base", "reduction", "results", "__init__"}
+    shared = {"base", "limits", "reduction", "results", "__init__"}
     assert {path.stem for path in (PACKAGE / "methods").glob("*.py")} - shared == set(METHODS)
     modules = {function.__module__.split(".")[-1] for function in MODELS.values()}
     assert {path.stem for path in (PACKAGE / "models").glob("*.py")} - {

@@ -19,6 +19,9 @@ from hipuq.sampling import BLOCK
 
 Array = NDArray[np.float64]
 
+STAGES = ("design", "refine", "estimate", "evaluations")
+"""Functions of a method that take options."""
+
 
 @dataclass(frozen=True)
 class Method:
@@ -33,9 +36,10 @@ class Method:
     estimate : callable
         ``(outcomes, inputs, *, of, rng=None, **options) -> results``.
     evaluations : callable
-        ``(inputs, n, **options of design) -> int``.
+        ``(inputs, n, **options) -> int``.
     refine : callable or None
-        ``(outcomes, inputs, rng, **options) -> samples or None``, of a sequential method.
+        ``(outcomes, inputs, rng, *, of, **options) -> samples or None``, of a sequential method: what
+        else it wants evaluated, None when it has enough.
     """
 
     title: str
@@ -45,8 +49,11 @@ class Method:
     refine: Callable[..., xr.Dataset | None] | None = None
 
     def options(self, stage: str) -> dict[str, Any]:
-        """Return the options of ``"design"`` or ``"estimate"`` with their defaults."""
-        signature = inspect.signature(getattr(self, stage))
+        """Return the options of a stage, one of `STAGES`, with their defaults."""
+        function = getattr(self, stage)
+        if function is None:
+            return {}
+        signature = inspect.signature(function)
         return {
             name: parameter.default
             for name, parameter in signature.parameters.items()
@@ -64,25 +71,26 @@ class Method:
         for name in options:
             check_name(f"option of the {stage} of {self.title}", name, self.options(stage))
 
-    def split(self, options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return the options of design and those of estimate.
+    def split(self, options: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+        """Return the options of each stage; several may take the same one.
 
         Raises
         ------
         UnknownNameError
-            If an option belongs to neither.
+            If an option belongs to none.
         InputError
             If a confidence is not one.
         """
-        design, estimate = self.options("design"), self.options("estimate")
+        known = {stage: self.options(stage) for stage in STAGES}
+        allowed = dict.fromkeys(name for own in known.values() for name in own)
         for name in options:
-            check_name(f"option of {self.title}", name, [*design, *estimate])
+            check_name(f"option of {self.title}", name, allowed)
         if "confidence" in options:
             check_confidence(options["confidence"])
-        return (
-            {name: value for name, value in options.items() if name in design},
-            {name: value for name, value in options.items() if name in estimate},
-        )
+        return {
+            stage: {name: value for name, value in options.items() if name in own}
+            for stage, own in known.items()
+        }
 
 
 def rows_of(total: int, rows: slice | None) -> slice:

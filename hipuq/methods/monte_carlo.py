@@ -14,13 +14,17 @@ from numpy.typing import NDArray
 from hipuq import schema
 from hipuq.errors import InputError, check_name
 from hipuq.inputs import Inputs
-from hipuq.intervals import check_confidence, student, wilson
+from hipuq.intervals import check_confidence
 from hipuq.methods.base import rows_of, samples_by_block
-from hipuq.methods.reduction import Moments, moments
-from hipuq.methods.results import Kind, finished, kind_of, labelled, levels_of, with_summaries
+from hipuq.methods.limits import columns
+from hipuq.methods.reduction import moments
+from hipuq.methods.results import ENDS, Kind, finished, kind_of, labelled, levels_of, with_summaries
 from hipuq.sampling import SAMPLERS, Seed, check_count, check_size, seed_of, unit_points
 
 Array = NDArray[np.float64]
+
+FIRST = 64
+"""Samples after which convergence is first told."""
 
 REPLICATES = {"random": 1, "latin_hypercube": 8, "sobol": 8}
 """Replicates by sampler where none are asked for: what its own error bar needs."""
@@ -195,7 +199,8 @@ def estimate(
         ``probability`` with ``_low`` and ``_high`` (interval, every unknown counted as 0 in the
         one and as 1 in the other), or ``mean`` with ``_low`` and ``_high`` and ``variance``; by level
         in a stratified analysis, then also ``probability_overall``, weighted, and for each group
-        of levels ``probability_mean``, ``_min``, ``_max`` and ``probability_weighted``.
+        of levels ``probability_mean``, ``_min``, ``_max`` and ``probability_weighted``. Without strata
+        ``probability_by_budget`` (or ``mean_by_budget``) with its limits shows the convergence.
 
     Raises
     ------
@@ -216,14 +221,20 @@ def estimate(
     if levels is not None and set(inputs) <= set(inputs.discrete):
         confidence = 1.0
     dims = ([] if levels is None else [levels.attrs["dim"]]) + [str(d) for d in values.dims[1:]]
-    columns = _columns(table, bounds, kind, confidence)
+    found = columns(table, bounds, kind, confidence)
     arrays = {
         name: xr.DataArray(column if levels is not None else column[0], dims=dims)
-        for name, column in columns.items()
+        for name, column in found.items()
     }
     results = labelled(values, kind, arrays)
     if levels is not None:
         results = with_summaries(results, levels, kind.quantity, arrays)
+    else:
+        parts = _by_budget(values, _bounds(outcomes, of), replicate, kind, confidence)
+        for (end, text), part in zip(ENDS.items(), parts.values(), strict=True):
+            attrs = results[f"{kind.quantity}{end}"].attrs
+            name = f"{attrs['long_name'].removesuffix(text)} after part of the samples{text}"
+            results[f"{kind.quantity}_by_budget{end}"] = part.assign_attrs(attrs, long_name=name)
     return finished(results, outcomes, inputs, of=of, method="monte_carlo", confidence=confidence)
 
 
@@ -241,42 +252,31 @@ def _bounds(outcomes: xr.Dataset, of: str) -> list[xr.DataArray]:
     return [outcomes[name] for name in names] if all(name in outcomes for name in names) else []
 
 
-def _columns(cells: Moments, bounds: list[Moments], kind: Kind, confidence: float) -> dict[str, Array]:
-    """Return estimates and limits by stratum from moments (strata, replicates, ...)."""
-    pooled = cells.pooled()
-    floor, ceiling = bounds or (cells, cells)
-    if kind.bounded and not bounds:
-        floor, ceiling = cells.with_unknown(0.0), cells.with_unknown(1.0)
-    if confidence == 1:
-        low, high = floor.pooled().mean, ceiling.pooled().mean
+def _by_budget(
+    values: xr.DataArray, bounds: list[xr.DataArray], replicate: NDArray[np.intp], kind: Kind, level: float
+) -> dict[str, xr.DataArray]:
+    """Return the estimate and its limits after a part of the samples: how it converges.
+
+    After each replicate, where there are several: only whole ones are designs of their own. Else after
+    `FIRST` samples, twice as many, and so on to all.
+    """
+    size = values.sizes["sample"]
+    if replicate.max() > 0:
+        shell = replicate
     else:
-        low, high = _limit(floor, kind, confidence)[0], _limit(ceiling, kind, confidence)[1]
-    if kind.bounded:
-        low, high = np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
+        shell = np.ceil(np.log2(np.maximum(np.arange(1, size + 1) / FIRST, 1.0))).astype(np.intp)
+    count = int(shell.max()) + 1
+    shells = [moments(part, shell, count) for part in (values, *bounds)]
+    rows = []
+    for k in range(1, count + 1):
+        first, *rest = (part.first(k).reshaped(1, k) for part in shells)
+        if replicate.max() == 0:
+            first, *rest = (part.pooled().reshaped(1, 1) for part in (first, *rest))
+        rows.append(columns(first, rest, kind, level))
+    budgets = ("budget", np.cumsum(shells[0].size).astype(np.int64), schema.COORDINATES["budget"].attrs)
     return {
-        "estimate": pooled.mean,
-        "low": low,
-        "high": high,
-        "floor": floor.pooled().mean,
-        "ceiling": ceiling.pooled().mean,
-        "known": pooled.known,
-        "variance": pooled.variance,
+        name: xr.DataArray(
+            np.concatenate([row[name] for row in rows]), dims=["budget", *values.dims[1:]]
+        ).assign_coords(budget=budgets)
+        for name in ("estimate", "low", "high")
     }
-
-
-def _limit(cells: Moments, kind: Kind, confidence: float) -> tuple[Array, Array]:
-    """Return the limits between replicates, or those of the pooled draws where replicates agree."""
-    pooled = cells.pooled()
-    if kind.quantity == "probability" and not kind.graded:
-        single = wilson(pooled.total, pooled.known, confidence)
-    else:
-        single = student(pooled.mean, pooled.squares, pooled.known, confidence)
-    replicates = cells.known.shape[1]
-    if replicates == 1:
-        return single
-    mean = cells.mean.mean(axis=1)
-    squares = np.square(cells.mean - mean[:, None]).sum(axis=1)
-    between = student(mean, squares, np.full_like(mean, replicates), confidence)
-    agree = squares == 0
-    low, high = (np.where(agree, a, b) for a, b in zip(single, between, strict=True))
-    return low, high

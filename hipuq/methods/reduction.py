@@ -54,6 +54,10 @@ class Moments:
         )
         return Moments(size, *rest)
 
+    def first(self, count: int) -> Moments:
+        """Return the moments of the first groups."""
+        return Moments(*(part[:count] for part in (self.size, self.known, self.mean, self.squares)))
+
     def pooled(self) -> Moments:
         """Return the moments over the second axis of groups together."""
         known = self.known.sum(axis=1)
