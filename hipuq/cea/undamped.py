@@ -226,8 +226,10 @@ def _gap_margin(values: Complex, rigid: Mask, scale: Array) -> Array:
     line = np.sort(np.where(real, values.real, np.inf), axis=1)
     with np.errstate(invalid="ignore"):
         gaps = np.diff(line, axis=1)
-    squared = np.where(np.isfinite(gaps), np.square(gaps), np.inf).min(axis=1, initial=np.inf)
-    pairs = -np.square(2 * values.imag).max(axis=1, where=~rigid, initial=0.0)
-    squared = np.where(pairs < 0, pairs, squared) / np.square(scale)
+    nearest = np.where(np.isfinite(gaps), gaps, np.inf).min(axis=1, initial=np.inf)
+    widest = np.abs(2 * values.imag).max(axis=1, where=~rigid, initial=0.0)
+    # The square of a pair's gap may underflow; it stays negative.
+    coupled = -np.maximum(np.square(widest / scale), np.finfo(np.float64).tiny)
+    squared = np.where(widest > 0, coupled, np.square(nearest / scale))
     margin: Array = np.minimum(squared, line[:, 0] / scale)
     return margin
