@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import logging
 import sys
+from functools import lru_cache
 from types import ModuleType
 from typing import Any
 
@@ -83,6 +84,37 @@ def cdf(distribution: Any, x: Array) -> Array:
     flat = np.asarray(distribution.cdf(np.ravel(at.clip(lower, upper))), dtype=np.float64)
     inside = flat.reshape(np.shape(x))
     return np.where(at < lower, 0.0, np.where(at >= upper, 1.0, inside))
+
+
+def is_discrete(value: object) -> bool:
+    """Say whether `value` is a chaospy distribution of integers."""
+    return is_distribution(value) and bool(value.interpret_as_integer)  # type: ignore[attr-defined]
+
+
+@lru_cache(maxsize=256)
+def recurrence(name: str, arguments: tuple[float, ...], order: int) -> Array:
+    """Return recurrence coefficients of the monic polynomials orthogonal for a distribution.
+
+    ``p[k+1](x) = (x - a[k]) p[k](x) - b[k] p[k-1](x)``, from chaospy's closed forms.
+
+    Parameters
+    ----------
+    name : str
+        Name of chaospy's distribution, one that has closed forms.
+    arguments : tuple of float
+        Its arguments.
+    order : int
+        Highest k.
+
+    Returns
+    -------
+    (2, order + 1) array
+        a and b; b[0] is 1, the whole probability.
+    """
+    chaospy = load()
+    found = np.array(chaospy.stieltjes(order, getattr(chaospy, name)(*arguments))[0][:, 0], np.float64)
+    found.flags.writeable = False
+    return found
 
 
 def to_dict(distribution: Any) -> dict[str, Any]:

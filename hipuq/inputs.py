@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.contact import ContactPatterns
-from hipuq.errors import InputError, unknown_name
+from hipuq.errors import InputError, SchemaError, unknown_name
 from hipuq.variation import Input, Nominal, as_input
 
 Array = NDArray[np.float64]
@@ -158,17 +158,74 @@ class Inputs(Mapping[str, Input]):
         points = np.clip(np.asarray(u, dtype=np.float64), _LOWEST, _HIGHEST)
         if points.ndim != 2 or points.shape[1] != self.dimension:
             raise InputError(f"points have the shape {points.shape}: they need {self.dimension} columns")
-        parts: list[xr.Dataset] = []
+        return _merged(entry.variables(part) for entry, part in self._columns(points))
+
+    def from_draws(self, draws: Array) -> xr.Dataset:
+        """Return the physical values that draws stand for; inputs with levels have none.
+
+        Parameters
+        ----------
+        draws : (s, dimension) array
+            Values of the distributions, columns in the order of `groups`.
+
+        Returns
+        -------
+        Dataset
+            As of `samples`.
+
+        Raises
+        ------
+        InputError
+            If an input has levels.
+        """
+        for name in self.discrete:
+            raise InputError(f"{name} is a contact pattern: it has levels, no draws")
+        return _merged(entry.from_draws(part) for entry, part in self._columns(draws))
+
+    def to_draws(self, samples: xr.Dataset) -> Array:
+        """Return the draws that samples come from, the inverse of `from_draws`.
+
+        Parameters
+        ----------
+        samples : Dataset
+            A variable for each input; others are ignored.
+
+        Returns
+        -------
+        (s, dimension) array
+
+        Raises
+        ------
+        SchemaError
+            If a variable is missing or has other dims.
+        InputError
+            If draws cannot be told from the values, or an input has levels.
+        """
+        draws = [np.empty((samples.sizes["sample"], 0))]
+        for name, entry in self._entries.items():
+            if name not in samples:
+                raise SchemaError(f"samples do not hold the input {name!r}: they hold {[*samples.data_vars]}")
+            dims = set(samples[name].dims)
+            if dims not in ({"sample"}, {"sample", *entry.dims}):
+                raise SchemaError(
+                    f"samples variable {name!r} has the dims {samples[name].dims}: "
+                    f"it needs {('sample', *entry.dims)}"
+                )
+            values = samples[name].transpose("sample", ...).values
+            if values.ndim > 1 and values.shape[1:] != entry.nominal.shape:
+                raise SchemaError(
+                    f"samples variable {name!r} has {values.shape[1]} elements: "
+                    f"the inputs have {entry.nominal.size}"
+                )
+            draws.append(entry.to_draws(values))
+        return np.concatenate(draws, axis=1)
+
+    def _columns(self, points: Array) -> Iterator[tuple[Input, Array]]:
+        """Yield each input with its columns of `points`."""
         start = 0
         for entry in self._entries.values():
-            parts.append(entry.variables(points[:, start : start + entry.columns]))
+            yield entry, points[:, start : start + entry.columns]
             start += entry.columns
-        merged: dict[Any, Any] = {}
-        for part in parts:
-            merged.update(dict(part.variables))
-        coords = {key for part in parts for key in part.coords}
-        data = {key: value for key, value in merged.items() if key not in coords}
-        return xr.Dataset(data, coords={key: merged[key] for key in coords})
 
     def to_json(self) -> str:
         """Return a JSON description, enough to rebuild the inputs."""
@@ -190,3 +247,13 @@ class Inputs(Mapping[str, Input]):
         except (json.JSONDecodeError, KeyError, TypeError, AttributeError) as error:
             raise InputError(f"not a description of inputs: {error}") from error
         return inputs
+
+
+def _merged(parts: Iterable[xr.Dataset]) -> xr.Dataset:
+    """Return variables and coords of several Datasets as one."""
+    data: dict[Any, Any] = {}
+    coords: dict[Any, Any] = {}
+    for part in parts:
+        data.update(part.data_vars.variables)
+        coords.update(part.coords.variables)
+    return xr.Dataset(data, coords=coords)

@@ -69,7 +69,9 @@ def student(mean: Array, squares: Array, n: Array, confidence: float) -> tuple[A
     return mean - half, mean + half
 
 
-def combined(table: xr.Dataset, weight: str, dim: str) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
+def combined(
+    table: xr.Dataset, weight: str, dim: str, spread: float | xr.DataArray = 0.0
+) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
     """Return a weighted mean of independent estimates over `dim`, with its interval.
 
     Distances to the limits are added in squares, which keeps the good behaviour of the single
@@ -84,6 +86,8 @@ def combined(table: xr.Dataset, weight: str, dim: str) -> tuple[xr.DataArray, xr
     weight : str
         Name of the weights over `dim`; they need not add up to 1.
     dim : str
+    spread : float or DataArray, default 0
+        Half-width of one more independent error of the whole, such as that of the weights.
 
     Returns
     -------
@@ -96,8 +100,8 @@ def combined(table: xr.Dataset, weight: str, dim: str) -> tuple[xr.DataArray, xr
     def total(part: xr.DataArray) -> xr.DataArray:
         return part.where(used, 0.0).sum(dim, skipna=False)
 
-    below = total((share * (table["floor"] - table["low"])) ** 2) ** 0.5
-    above = total((share * (table["high"] - table["ceiling"])) ** 2) ** 0.5
+    below = (total((share * (table["floor"] - table["low"])) ** 2) + spread**2) ** 0.5
+    above = (total((share * (table["high"] - table["ceiling"])) ** 2) + spread**2) ** 0.5
     return (
         total(share * table["estimate"]),
         total(share * table["floor"]) - below,

@@ -38,17 +38,22 @@ class Variable:
         Its dims.
     role : str
         ``"verdict"``, ``"probability"`` or empty.
+    limit_state : float or None
+        Value below which the variable means instability.
     """
 
     long_name: str
     units: str = "1"
     dims: tuple[str, ...] = ("sample",)
     role: str = ""
+    limit_state: float | None = None
 
     @property
-    def attrs(self) -> dict[str, str]:
+    def attrs(self) -> dict[str, Any]:
         """Attributes of the variable in a Dataset."""
-        attrs = {"long_name": self.long_name, "units": self.units}
+        attrs: dict[str, Any] = {"long_name": self.long_name, "units": self.units}
+        if self.limit_state is not None:
+            attrs["limit_state"] = self.limit_state
         return attrs | ({"role": self.role} if self.role else {})
 
 
@@ -82,7 +87,7 @@ OUTCOMES: dict[str, Variable] = {
     "unstable": Variable("mode unstable", dims=("sample", "mode"), role=VERDICT),
     "any_unstable": Variable("any mode unstable", role=VERDICT),
     "unstable_count": Variable("number of unstable modes"),
-    "margin": Variable("stability margin (negative: unstable)"),
+    "margin": Variable("stability margin (negative: unstable)", limit_state=0.0),
     "mechanisms": Variable("number of rigid mechanisms"),
 }
 """Outcomes of a complex eigenvalue analysis, see :mod:`hipuq.cea`."""
@@ -120,10 +125,18 @@ COORDINATES: dict[str, Variable] = {
     "in_contact": Variable("oscillators in contact"),
     "weight": Variable("probability of the level"),
     "replicate": Variable("replicate of the design"),
+    "block": Variable("base point of the design"),
+    "matrix": Variable("matrix of the design"),
+    "parameter": Variable("parameter", dims=("parameter",)),
+    "parameter_2": Variable("second parameter", dims=("parameter_2",)),
     "round": Variable("round of a sequential method"),
     "stratum": Variable("use of the sample: -1 to fit, 0 held out, from 1 a stratum of the correction"),
     "stratum_weight": Variable("probability that the stratum holds"),
     "quadrature_weight": Variable("weight of the quadrature node"),
+    "quantile": Variable("probability below", dims=("quantile",)),
+    "held_out": Variable("number of the held-out sample", dims=("held_out",)),
+    "element": Variable("element of a parameter", dims=("element",)),
+    "term": Variable("term of the expansion", dims=("term",)),
     "budget": Variable("evaluations", dims=("budget",)),
 }
 """Coordinates and dims."""

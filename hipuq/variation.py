@@ -110,15 +110,35 @@ class Input:
         """Return the physical values at points of the unit cube, (samples, columns)."""
         if isinstance(self.distribution, ContactPatterns):
             return self.distribution.variables(self.name, self.distribution.ppf(u[:, 0]), "sample")
-        draw = np.asarray(self.distribution.ppf(u if self.each else u[:, 0]), dtype=np.float64)
-        shape = (len(u), *self.nominal.shape)
-        draw = draw.reshape(len(u), -1) if self.nominal.ndim else draw.reshape(len(u))
-        if self.how == "relative":
-            values = self.nominal * (1 + draw)
-        elif self.how == "shift":
-            values = self.nominal + draw
-        else:
-            values = draw
+        return self.from_draws(self.draws(u))
+
+    @property
+    def drawn(self) -> Distribution:
+        """Distribution of a draw.
+
+        Raises
+        ------
+        InputError
+            If it is a contact pattern, which is a level and no number.
+        """
+        if isinstance(self.distribution, ContactPatterns):
+            raise InputError(f"{self.name} is a contact pattern: it has levels, no draws")
+        return self.distribution
+
+    def draws(self, u: Array) -> Array:
+        """Return the draws at points of the unit cube, both (samples, columns).
+
+        Raises
+        ------
+        InputError
+            If it is a contact pattern.
+        """
+        draws = np.asarray(self.drawn.ppf(u if self.each else u[:, 0]), dtype=np.float64)
+        return draws.reshape(len(u), self.columns)
+
+    def from_draws(self, draws: Array) -> xr.Dataset:
+        """Return the physical values that draws (samples, columns) stand for."""
+        values = self._applied(draws)
         known = schema.PARAMETERS.get(self.name)
         attrs = known.attrs if known else {"long_name": self.name, "units": ""}
         coords = {
@@ -126,8 +146,68 @@ class Input:
             for dim, size in zip(self.dims, self.nominal.shape, strict=True)
             if dim in schema.COORDINATES
         }
-        dims = ("sample", *self.dims)
-        return xr.Dataset({self.name: (dims, np.broadcast_to(values, shape).copy(), attrs)}, coords)
+        return xr.Dataset({self.name: (("sample", *self.dims), values, attrs)}, coords)
+
+    def _applied(self, draws: Array) -> Array:
+        draw = draws if self.nominal.ndim else draws[:, 0]
+        if self.how == "relative":
+            values = self.nominal * (1 + draw)
+        elif self.how == "shift":
+            values = self.nominal + draw
+        else:
+            values = draw
+        return np.broadcast_to(values, (len(draws), *self.nominal.shape)).copy()
+
+    def to_draws(self, values: Array) -> Array:
+        """Return the draws that physical values come from, the inverse of `from_draws`.
+
+        Parameters
+        ----------
+        values : (samples,) or (samples, size) array
+            One number for all elements, or one for each.
+
+        Returns
+        -------
+        (samples, columns) array
+
+        Raises
+        ------
+        InputError
+            If the draw cannot be told from the values (relative to a nominal value of 0), or elements
+            that share a draw have values of different ones.
+        """
+        nominal = np.atleast_1d(self.nominal)
+        x = np.asarray(values, dtype=np.float64)
+        x = np.broadcast_to(x[:, None] if x.ndim == 1 else x, (len(x), nominal.size))
+        if not self.each:
+            # Of the elements that share a draw take the one that it can be told from best.
+            size = np.abs(nominal)
+            best = int(np.argmax(size) if self.how == "relative" else np.argmin(size))
+            x, nominal = x[:, best : best + 1], nominal[best : best + 1]
+        if self.how == "relative":
+            if not nominal.all():
+                raise InputError(
+                    f"{self.name} is relative to a nominal value of 0, which no draw changes: "
+                    "take shift, or leave it out"
+                )
+            draws = x / nominal - 1
+        else:
+            draws = x - nominal if self.how == "shift" else x
+        draws = np.array(draws)
+        if not self.each and np.ndim(values) > 1:
+            self._check_shared(np.asarray(values, dtype=np.float64), draws)
+        return draws
+
+    def _check_shared(self, values: Array, draws: Array) -> None:
+        again = self._applied(draws)
+        with np.errstate(invalid="ignore"):
+            wrong = np.abs(again - values) > 1e-6 * np.abs(again).max(initial=0.0)
+        if wrong.any():
+            bad = int(np.argmax(wrong.any(axis=1)))
+            raise InputError(
+                f"the elements of {self.name} share one draw, but not those of sample {bad}: "
+                "were these samples made for other inputs?"
+            )
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-able description."""

@@ -8,7 +8,7 @@ from scipy import stats
 
 import hipuq
 from hipuq.errors import InputError, SchemaError, UnknownNameError
-from hipuq.methods.reduction import moments
+from hipuq.estimation.reduction import moments
 
 INPUTS = hipuq.Inputs(x=cp.Uniform(0, 1))
 

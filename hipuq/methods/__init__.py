@@ -1,6 +1,6 @@
 """Methods: each is one file with ``design``, ``estimate`` and ``evaluations``, and one line in `METHODS`."""
 
-from hipuq.methods import monte_carlo
+from hipuq.methods import chaos, monte_carlo, sobol
 from hipuq.methods.base import Method
 
 METHODS: dict[str, Method] = {
@@ -9,6 +9,19 @@ METHODS: dict[str, Method] = {
         design=monte_carlo.design,
         estimate=monte_carlo.estimate,
         evaluations=monte_carlo.evaluations,
+    ),
+    "chaos": Method(
+        title="polynomial chaos",
+        design=chaos.design,
+        estimate=chaos.estimate,
+        evaluations=chaos.evaluations,
+        refine=chaos.refine,
+    ),
+    "sobol": Method(
+        title="Sobol indices",
+        design=sobol.design,
+        estimate=sobol.estimate,
+        evaluations=sobol.evaluations,
     ),
 }
 """Name of a method -> its functions."""

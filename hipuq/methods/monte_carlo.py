@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import InputError, check_name
+from hipuq.estimation.limits import columns
+from hipuq.estimation.reduction import moments
+from hipuq.estimation.results import ENDS, Kind, finished, kind_of, labelled, levels_of, with_summaries
 from hipuq.inputs import Inputs
 from hipuq.intervals import check_confidence
 from hipuq.methods.base import rows_of, samples_by_block
-from hipuq.methods.limits import columns
-from hipuq.methods.reduction import moments
-from hipuq.methods.results import ENDS, Kind, finished, kind_of, labelled, levels_of, with_summaries
 from hipuq.sampling import SAMPLERS, Seed, check_count, check_size, seed_of, unit_points
 
 Array = NDArray[np.float64]
@@ -98,7 +98,7 @@ def design(
         drawn = {key: (("sample", *part.dims[1:]), part.values, part.attrs) for key, part in along.items()}
         samples = samples.assign({name: drawn.pop(name)}).assign_coords(drawn)
         samples = samples.assign_coords({d: levels[d] for d in levels[name].dims[1:]})
-    options = {"design": {"n": n, "sampler": sampler, "stratify": name or False, "replicates": parts}}
+    options = {"design": {"n": int(n), "sampler": sampler, "stratify": name or False, "replicates": parts}}
     return schema.stamp(
         samples,
         f"design monte_carlo, {total} samples",

@@ -19,17 +19,27 @@ function                          shows                                       ta
 `dispersion`                      real and imaginary parts of all modes       friction sweep
 `root_locus`                      growth rate over frequency                  friction sweep
 `damping_over_frequency`          damping ratio over frequency                friction sweep
+`index_bars`                      first- and total-order index of each        results with ``S1``, ``ST``
+                                  parameter
+`second_order`                    second-order index of each pair of          results with ``S2``
+                                  parameters
+`convergence`                     an estimate over the evaluations used       results of ``_by_budget``
+`predicted_against_true`          a surrogate against the model, on           results of ``chaos``
+                                  held-out samples
 ================================  ==========================================  ============================
 
 A friction sweep is ``evaluate(model, model.nominal(friction=np.linspace(0, 0.1, 1001)))``;
 `follow_modes` follows modes through one, `lock_in_bracket` reads off where a mode locks in.
 """
 
+from hipuq.plots.convergence import convergence
 from hipuq.plots.eigenvalue_plane import damping_over_frequency, root_locus
 from hipuq.plots.fragility_curves import fragility, onset_distribution
 from hipuq.plots.friction_sweep import dispersion, frequency_over_friction, growth_over_friction, lock_in
+from hipuq.plots.indices import index_bars, second_order
 from hipuq.plots.mode_shapes import mode_shape
 from hipuq.plots.occurrences import occurrence, occurrence_panels
+from hipuq.plots.surrogate import predicted_against_true
 from hipuq.plots.tracking import follow_modes, lock_in_bracket
 
 __all__ = [
@@ -44,6 +54,10 @@ __all__ = [
     "dispersion",
     "root_locus",
     "damping_over_frequency",
+    "index_bars",
+    "second_order",
+    "convergence",
+    "predicted_against_true",
     "follow_modes",
     "lock_in_bracket",
 ]

@@ -6,7 +6,7 @@ import xarray as xr
 from rich.console import Console
 from rich.markup import escape
 
-from hipuq.report.summary import Table
+from hipuq.report.table import Table
 from hipuq.report.text import printed, screen_for
 
 DIGITS = 13

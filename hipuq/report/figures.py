@@ -3,15 +3,36 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hipuq import plots
 from hipuq.report.partners import exact_of, groups_of, summed_up
 from hipuq.schema import is_exact
+
+SETTLING = ("probability_overall", "probability", "mean_overall", "mean", "S1", "ST")
+"""Estimates whose convergence is shown."""
+
+DRAWN: dict[tuple[str, tuple[str, ...], tuple[str, ...]], tuple[Callable[[xr.Dataset], Axes], str]] = {
+    ("indices", ("S1", "ST"), ("parameter",)): (
+        plots.index_bars,
+        "Sobol indices: the share of the variance that each parameter explains alone (first order) and "
+        "with its interactions (total order).",
+    ),
+    ("second_order", ("S2",), ("parameter", "parameter_2")): (
+        plots.second_order,
+        "Second-order Sobol indices: the share of the variance that the interaction of each pair explains.",
+    ),
+    ("surrogate", ("true", "predicted"), ("held_out",)): (
+        plots.predicted_against_true,
+        "The surrogate against the model, on samples that it was not fitted to.",
+    ),
+}
+"""Name of a figure, the variables that it needs and their dims -> what draws it, its caption."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +89,8 @@ def pictures(tree: xr.DataTree) -> Iterator[Picture]:
             yield _mode_shapes(analysis, groups["mode_shapes"], options, names)
         if "friction_sweep" in groups:
             yield from _sweep(analysis, groups["friction_sweep"], options)
+        for of, results in groups.items():
+            yield from _by_method(analysis, of, results)
 
 
 def _occurrence(
@@ -139,3 +162,24 @@ def _sweep(analysis: str, sweep: xr.Dataset, options: dict[str, list[tuple[int, 
         "negative one belongs to a growing mode.",
         figure,
     )
+
+
+def _by_method(analysis: str, of: str, results: xr.Dataset) -> Iterator[Picture]:
+    """Give indices, surrogate against model and convergence of a scalar outcome, as far as there are any."""
+    dims = {str(name): set(values.dims) for name, values in results.data_vars.items()}
+    for (name, needed, over), (draw, caption) in DRAWN.items():
+        # Pairs take two parameters.
+        enough = all(results.sizes.get(dim, 0) >= len(over) for dim in over)
+        if enough and all(dims.get(key) == set(over) for key in needed):
+            figure = draw(results).figure
+            assert isinstance(figure, Figure)
+            yield Picture(analysis, f"{name}_{of}", caption, figure)
+    settling = [
+        name for name in SETTLING if dims.get(f"{name}_by_budget") in ({"budget"}, {"budget", "parameter"})
+    ]
+    if settling:
+        figure = Figure(figsize=(6.4 * len(settling), 4.4), layout="constrained")
+        for quantity, ax in zip(settling, figure.subplots(1, len(settling), squeeze=False)[0], strict=True):
+            plots.convergence(results, ax=ax, quantity=quantity)
+        caption = "Convergence: the estimate from the first evaluations alone, over their number."
+        yield Picture(analysis, f"convergence_{of}", caption, figure)

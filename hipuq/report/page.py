@@ -15,6 +15,7 @@ from hipuq import schema
 from hipuq.errors import StoreError
 from hipuq.report.figures import pictures
 from hipuq.report.partners import comparison, groups_of
+from hipuq.report.sensitivity import has_indices, note, remarks
 from hipuq.report.summary import (
     bounded,
     estimates,
@@ -90,12 +91,13 @@ def content(tree: xr.DataTree, images: dict[str, list[dict[str, str]]]) -> dict[
         Variables of the template.
     """
     names = json.loads(tree.attrs.get("report", "{}")).get("mode_names", {})
-    sections = []
+    sections, indices = [], False
     groups = groups_of(tree)
     for analysis in groups:
         found = dict(estimates(tree, analysis))
         if not found:
             continue
+        indices = indices or any(map(has_indices, found.values()))
         first = next(iter(found.values()))
         sections.append(
             {
@@ -103,6 +105,12 @@ def content(tree: xr.DataTree, images: dict[str, list[dict[str, str]]]) -> dict[
                 "attrs": first.attrs,
                 "trust": trust(first),
                 "headlines": [line for line in map(headline, found.values()) if line],
+                "note": note(first),
+                "remarks": [
+                    f"{of}: {line}" if len(found) > 1 else line
+                    for of, one in found.items()
+                    for line in remarks(one)
+                ],
                 "inputs": inputs_table(first),
                 "tables": [table for results in found.values() for table in tables(results, names)],
                 "images": images.get(analysis, []),
@@ -115,4 +123,4 @@ def content(tree: xr.DataTree, images: dict[str, list[dict[str, str]]]) -> dict[
                 "confidence": f"{first.attrs['confidence']:.0%}",
             }
         )
-    return {"study": tree.attrs, "sections": sections}
+    return {"study": tree.attrs, "sections": sections, "indices": indices}

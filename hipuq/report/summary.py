@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -13,33 +12,14 @@ import xarray as xr
 
 from hipuq import schema
 from hipuq.errors import SchemaError
-
-MISSING = "n/a"
-"""What stands for a number that does not exist."""
+from hipuq.report import sensitivity
+from hipuq.report.table import Table, mode_label, number, sentence, share
 
 SAME = 1e-12
 """Bounds of exact results that are this close to the value say no more than the value."""
 
 STUDY_ATTRS = ("title", "description", "study", "seed", "report", "study_file", "hipuq_version")
 """Attributes that the results of a study have."""
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table of text.
-
-    Attributes
-    ----------
-    title : str
-    columns : list of str
-        Headings, with units.
-    rows : list of list of str
-        Cells as they are shown.
-    """
-
-    title: str
-    columns: list[str]
-    rows: list[list[str]]
 
 
 def analyses(tree: xr.DataTree) -> list[str]:
@@ -59,18 +39,8 @@ def analyses(tree: xr.DataTree) -> list[str]:
 def estimates(tree: xr.DataTree, analysis: str) -> Iterator[tuple[str, xr.Dataset]]:
     """Give the results of an analysis: the outcome analysed and its Dataset."""
     for of, node in tree[analysis].children.items():
-        if "of" in node.attrs and ("probability" in node or "mean" in node):
+        if "of" in node.attrs and any(name in node for name in ("probability", "mean", "S1")):
             yield str(of), schema.check_results(node.to_dataset(inherit=False))
-
-
-def number(value: float, digits: int = 4) -> str:
-    """Return a number as text."""
-    return MISSING if np.isnan(value) else f"{value:.{digits}g}"
-
-
-def share(value: float, digits: int = 4) -> str:
-    """Return a probability as text with fixed decimals."""
-    return MISSING if np.isnan(value) else f"{value:.{digits}f}"
 
 
 def bounded(results: xr.Dataset, key: str) -> bool:
@@ -93,11 +63,12 @@ def interval(results: xr.Dataset, key: str) -> str:
 
 def headline(results: xr.Dataset) -> str:
     """Return the result of an analysis over everything in one line; empty if there is none."""
+    if sensitivity.has_indices(results):
+        return sensitivity.headline(results)
     quantity = "probability" if "probability" in results else "mean"
     for key in (f"{quantity}_overall", quantity):
         if key in results and results[key].ndim == 0:
-            name = str(results[key].attrs["long_name"])
-            return f"{name[:1].upper()}{name[1:]}: {interval(results, key)}"
+            return f"{sentence(str(results[key].attrs['long_name']))}: {interval(results, key)}"
     return ""
 
 
@@ -124,8 +95,11 @@ def tables(results: xr.Dataset, mode_names: dict[str, str] | None = None) -> lis
     Returns
     -------
     list of Table
-        By group of levels (a column each where there are modes), or by mode, or none.
+        By group of levels (a column each where there are modes), or by mode, or none; of Sobol indices
+        see `hipuq.report.sensitivity`.
     """
+    if sensitivity.has_indices(results):
+        return sensitivity.tables(results, mode_names)
     quantity = "probability" if "probability" in results else "mean"
     if f"{quantity}_mean" in results:
         if "mode" in results.dims:
@@ -221,14 +195,6 @@ def _text(results: xr.Dataset, quantity: str, digits: int) -> Callable[[float], 
     if not quantity.startswith("probability"):
         return number
     return partial(share, digits=digits if schema.is_exact(results) else 4)
-
-
-def mode_label(results: xr.Dataset, mode: int, names: dict[str, str] | None = None) -> str:
-    """Return a mode's number with its pair and its name in a publication."""
-    pair = str(results["pair"].sel(mode=mode).item()) if "pair" in results.coords else ""
-    published = (names or {}).get(str(mode))
-    label = f"{mode} (pair {pair})" if "-" in pair else str(mode)
-    return f"{label}, paper {published}" if published else label
 
 
 def inputs_table(results: xr.Dataset) -> Table:

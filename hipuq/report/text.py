@@ -12,7 +12,9 @@ from rich.table import Table as RichTable
 
 from hipuq import schema
 from hipuq.report.partners import comparison, groups_of
-from hipuq.report.summary import Table, estimates, headline, tables, trust
+from hipuq.report.sensitivity import has_indices, remarks
+from hipuq.report.summary import estimates, headline, tables, trust
+from hipuq.report.table import Table
 
 
 def show_results(tree: xr.DataTree, console: Console | None = None) -> None:
@@ -37,9 +39,11 @@ def show_results(tree: xr.DataTree, console: Console | None = None) -> None:
                 line += "" if exact else f", seed {results.attrs['seed']}"
                 screen.print(f"\n[bold]{escape(analysis)}[/bold]: {escape(line)}")
                 screen.print(trust(results))
-            if "mode" not in results.dims:
-                screen.print(escape(headline(results)))
-            for table in tables(results, names)[:1]:
+            indices = has_indices(results)
+            if "mode" not in results.dims or indices:
+                for line in filter(None, [headline(results), *remarks(results)]):
+                    screen.print(escape(line))
+            for table in tables(results, names)[: 2 if indices else 1]:
                 screen.print(printed(table))
         if line := comparison(analysis, found):
             screen.print(escape(line))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hipuq.estimation.reduction import Moments
+from hipuq.estimation.results import Kind
 from hipuq.intervals import student, wilson
-from hipuq.methods.reduction import Moments
-from hipuq.methods.results import Kind
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""From outcomes to labelled numbers: moments, limits, names; what all methods share."""

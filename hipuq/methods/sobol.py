@@ -1,0 +1,320 @@
+"""Sobol indices: which parameters the variance of an outcome comes from.
+
+The first-order index of a parameter is the share of the variance that goes when it alone is known, the
+total-order index the share that stays when all others are. They are estimated as SALib does, their
+limits by a bootstrap over base points.
+"""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from hipuq import schema
+from hipuq.errors import InputError
+from hipuq.estimation.indices import labelled, symmetric, undefined
+from hipuq.estimation.results import ENDS, Kind, finished, kind_of
+from hipuq.inputs import Inputs
+from hipuq.intervals import check_confidence
+from hipuq.methods.base import rows_of, samples_by_block
+from hipuq.saltelli.decomposition import base, indices, reason
+from hipuq.saltelli.layout import Layout, check_flag, layout_of
+from hipuq.sampling import Seed, check_count, seed_of, spawn, unit_points
+
+Array = NDArray[np.float64]
+
+MAXIMUM_COLUMNS = 21201 // 2
+"""Columns of the unit cube: scipy has Sobol points of 21201 dimensions, and a base point is two points."""
+
+MAXIMUM_POINTS = 2**30
+"""Length of scipy's Sobol sequence."""
+
+STREAM = 2**31
+"""Key of the stream of the design's seed that the seed of resamples is drawn from."""
+
+FIRST_BUDGET = 16
+"""Base points of the first estimate of the convergence; each further one has twice as many."""
+
+
+def design(
+    inputs: Inputs,
+    n: int,
+    rng: Seed,
+    *,
+    rows: slice | None = None,
+    groups: bool = True,
+    second_order: bool = False,
+) -> xr.Dataset:
+    """Return samples of the inputs; `hipuq.saltelli.layout` says which rows.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        The uncertain parameters.
+    n : int
+        Number of base points, a power of 2: scrambled Sobol points. Of g parameters each gives g + 2
+        samples, 2 g + 2 with second order.
+    rng : int or Generator
+        Seed.
+    rows : slice, optional
+        Only these rows of the design.
+    groups : bool, default True
+        Whether the elements of a parameter, such as nine stiffnesses, are taken together. If not, each
+        counts as a parameter: ``spring_stiffness[3]``.
+    second_order : bool, default False
+        Whether to sample for the indices of pairs of parameters too.
+
+    Returns
+    -------
+    Dataset
+        Coords ``block(sample)``, the base point from 0, and ``matrix(sample)``, a flag.
+
+    Raises
+    ------
+    InputError
+        If n is not a power of 2 from 2 on, or the inputs have too many elements.
+    """
+    layout = _plan(inputs, n, groups, second_order)
+    seed = seed_of(rng)
+    owner = np.array(
+        [layout.names.index(name) for name in inputs.groups] if groups else range(inputs.dimension)
+    )
+    total = int(n) * layout.width
+
+    def points(part: slice) -> Array:
+        block, matrix = np.divmod(np.arange(part.start, part.stop), layout.width)
+        wanted = slice(int(block[0]), int(block[-1]) + 1)
+        base = unit_points("sobol", n, 2 * inputs.dimension, seed, (0,), wanted)
+        return layout.points(base[block - wanted.start], matrix, owner)
+
+    samples = samples_by_block(inputs, points, rows_of(total, rows), total)
+    block, matrix = np.divmod(samples["sample"].values, layout.width)
+    samples = samples.assign_coords(
+        block=("sample", block, schema.COORDINATES["block"].attrs),
+        matrix=("sample", matrix.astype(np.int16), layout.attrs),
+    )
+    return schema.stamp(
+        samples,
+        f"design sobol, {total} samples",
+        method="sobol",
+        seed=seed,
+        options={"design": {"n": int(n), "groups": bool(groups), "second_order": layout.second_order}},
+        inputs=inputs.to_json(),
+    )
+
+
+def evaluations(inputs: Inputs, n: int, *, groups: bool = True, second_order: bool = False) -> int:
+    """Return the number of model runs of a design.
+
+    Parameters
+    ----------
+    inputs : Inputs
+    n : int
+    groups, second_order
+        As in `design`.
+
+    Returns
+    -------
+    int
+    """
+    return n * _plan(inputs, n, groups, second_order).width
+
+
+def _plan(inputs: Inputs, n: int, groups: bool, second_order: bool) -> Layout:
+    """Return the layout of a design that can be made."""
+    n = check_count("n", n, 2)
+    if n & (n - 1):
+        below = 1 << (n.bit_length() - 1)
+        raise InputError(f"n is {n}: the base points must be a power of 2, so take {below} or {2 * below}")
+    if n > MAXIMUM_POINTS:
+        raise InputError(f"n is {n}: there are at most {MAXIMUM_POINTS} base points")
+    if inputs.dimension > MAXIMUM_COLUMNS:
+        raise InputError(
+            f"the inputs have {inputs.dimension} elements: a Sobol design has at most {MAXIMUM_COLUMNS}; "
+            "let elements share a draw, without each="
+        )
+    return Layout.of(inputs, groups, second_order)
+
+
+def estimate(
+    outcomes: xr.Dataset,
+    inputs: Inputs,
+    *,
+    of: str,
+    rng: Seed = None,
+    confidence: float = 0.95,
+    resamples: int = 1000,
+    second_order: bool | None = None,
+    minimum_events: int = 50,
+) -> xr.Dataset:
+    """Estimate Sobol indices of an outcome.
+
+    A block with a failed or unknown sample, or without one that it should have, is dropped, for each
+    element of the outcome by itself. Indices are undefined (NaN), and say why, where fewer than two
+    blocks are left, where the outcome does not vary, and where an outcome of 0 and 1 has too few of
+    either to tell. The bootstrap takes base points for independent; those of a Sobol sequence are more
+    even, so for a smooth outcome the limits are wider than its error.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+        The variable over ``sample``, with the coords ``block`` and ``matrix`` of the design: all of it
+        or any part, in any order.
+    inputs : Inputs
+        The inputs of the design.
+    of : str
+        Name of the outcome.
+    rng : int or Generator, optional
+        Seed of the resampling; by default from the design's, and from the operating system where the
+        outcomes do not name it. The results name the one taken, ``resampling_seed``, in their options.
+    confidence : float, default 0.95
+        Level of the percentile intervals.
+    resamples : int, default 1000
+        Number of resamples.
+    second_order : bool, optional
+        Whether to estimate indices of pairs; by default where the design has samples for them.
+    minimum_events : int, default 50
+        Of an outcome of 0 and 1, how many of each there must be among the samples of A and B.
+
+    Returns
+    -------
+    Dataset
+        ``S1(parameter)``, ``ST(parameter)`` and, with second order, ``S2(parameter, parameter_2)``, each
+        with ``_low`` and ``_high``; ``S1_by_budget``, ``ST_by_budget`` and their limits from the first
+        base points alone; ``mean`` and ``variance`` over A and B; the blocks used, ``base_samples``, and
+        ``dropped``; ``events`` and ``non_events`` of an outcome of 0 and 1. All also over the dims that
+        the outcome has besides ``sample``.
+
+    Raises
+    ------
+    SchemaError
+        If the outcomes are not of a design of this method for these inputs.
+    InputError
+        If a value is infinite, or an option cannot be used.
+    """
+    confidence = check_confidence(confidence)
+    resamples = check_count("resamples", resamples, 2)
+    minimum_events = check_count("minimum_events", minimum_events, 0)
+    values = schema.check_outcomes(outcomes, of)
+    layout = layout_of(outcomes, inputs)
+    table, rows = layout.table(values, outcomes)
+    _check_finite(table, int(rows.sum()), of)
+    layout, table = _of_order(second_order, layout, table)
+    verdict = kind_of(values) == Kind("probability")
+    seed = _resampling_seed(rng, outcomes)
+
+    sizes = [*(FIRST_BUDGET << k for k in range(31) if FIRST_BUDGET << k < len(rows)), len(rows)]
+    least = minimum_events if verdict else None
+    reasons = [[reason(one, least) for one in table[:, :size]] for size in sizes]
+    found = [
+        indices(
+            table[:, :size],
+            why,
+            len(layout.names),
+            layout.pairs if size == len(rows) else [],
+            seed=seed,
+            resamples=resamples,
+            confidence=confidence,
+        )
+        for size, why in zip(sizes, reasons, strict=True)
+    ]
+    budget = np.cumsum(rows)[np.array(sizes) - 1]
+    results = _labelled(found, reasons, layout, values, budget).assign(_counts(table, values, verdict))
+    results = finished(results, outcomes, inputs, of=of, method="sobol", confidence=confidence)
+    options = json.loads(results.attrs["options"])
+    options["estimate"] |= {
+        "resamples": resamples,
+        "second_order": layout.second_order,
+        "minimum_events": minimum_events,
+        "resampling_seed": seed,
+    }
+    return results.assign_attrs(options=json.dumps(options))
+
+
+def _check_finite(table: Array, samples: int, of: str) -> None:
+    infinite = int(np.isinf(table).any(axis=0).sum())
+    if infinite:
+        raise InputError(
+            f"{of} is infinite in {infinite} samples ({infinite / samples:.2%}): it has no variance; "
+            "analyse another outcome"
+        )
+
+
+def _of_order(second_order: bool | None, layout: Layout, table: Array) -> tuple[Layout, Array]:
+    """Return layout and outcomes, without the rows for pairs if those are not wanted."""
+    if second_order is None:
+        return layout, table
+    wanted = Layout(layout.names, check_flag("second_order", second_order))
+    if wanted.second_order and not layout.second_order:
+        raise InputError(
+            "second_order is True, but the design has no samples for pairs: design with second_order=True"
+        )
+    kept = [matrix in wanted.matrices for matrix in layout.matrices]
+    return wanted, table[:, :, kept]
+
+
+def _resampling_seed(rng: Seed, outcomes: xr.Dataset) -> int:
+    """Return the seed of resamples: `rng`, else from the design's, else from the operating system."""
+    given = outcomes.attrs.get("seed")
+    if rng is None and isinstance(given, (int, np.integer)) and given >= 0:
+        rng = spawn(int(given), STREAM)
+    return seed_of(rng)
+
+
+def _labelled(
+    found: list[Array],
+    reasons: list[list[str]],
+    layout: Layout,
+    values: xr.DataArray,
+    budget: NDArray[np.int64],
+) -> xr.Dataset:
+    """Return indices of all budgets, the last one of all outcomes, as a Dataset."""
+    shape, count = values.shape[1:], len(layout.names)
+    places = {"S1": slice(0, count), "ST": slice(count, 2 * count)}
+    whole, settling = found[-1], np.stack([part[:, : 2 * count] for part in found])
+    missing = np.isnan(whole[1:].sum(axis=(0, 1)))
+    no_limits = "the outcome does not vary in some resamples, so there are no limits; take more samples"
+    why = undefined(reasons[-1], values)
+    without = [text or (no_limits if lost else "") for text, lost in zip(reasons[-1], missing, strict=True)]
+    why_limits = undefined(without, values)
+    early = undefined(reasons[0], values)
+    arrays, texts = {}, {}
+    for e, end in enumerate(ENDS):
+        for name, place in places.items():
+            arrays[name + end] = whole[e, place].reshape(count, *shape)
+            key = f"{name}_by_budget{end}"
+            arrays[key] = settling[:, e, place].reshape(len(budget), count, *shape)
+            texts[key] = why or (early and f"at {budget[0]} evaluations: {early}")
+        if layout.second_order:
+            arrays["S2" + end] = symmetric(whole[e, 2 * count :], count).reshape(count, count, *shape)
+    texts |= {name + end: why_limits if end else why for name in ("S1", "ST", "S2") for end in ENDS}
+    return labelled(arrays, layout.names, values, texts, budget)
+
+
+def _counts(table: Array, values: xr.DataArray, verdict: bool) -> dict[str, xr.DataArray]:
+    """Return moments over A and B and counts of an outcome."""
+    known = [base(one) for one in table]
+    with np.errstate(over="ignore"):
+        variance = [both.var(ddof=1) if both.size else np.nan for both in known]
+    name, units = values.attrs.get("long_name", values.name), str(values.attrs.get("units", ""))
+    columns: dict[str, tuple[list[float], str, str]] = {
+        "mean": ([both.mean() if both.size else np.nan for both in known], f"mean of {name}", units),
+        "variance": (variance, f"variance of {name}", f"({units})^2" if units else ""),
+        "base_samples": ([len(both) for both in known], "base points used", "1"),
+        "dropped": ([table.shape[1] - len(both) for both in known], "base points dropped", "1"),
+    }
+    if verdict:
+        for key, value in (("events", 1), ("non_events", 0)):
+            text = f"{key.replace('_', '-')} among the samples of A and B"
+            columns[key] = ([int((both == value).sum()) for both in known], text, "1")
+    return {
+        key: xr.DataArray(
+            np.array(column).reshape(values.shape[1:]),
+            dims=values.dims[1:],
+            attrs={"long_name": text, "units": unit},
+        )
+        for key, (column, text, unit) in columns.items()
+    }

@@ -1,0 +1,78 @@
+"""Tables of text, and numbers as their cells show them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+MISSING = "n/a"
+"""What stands for a number that does not exist."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of text.
+
+    Attributes
+    ----------
+    title : str
+    columns : list of str
+        Headings, with units.
+    rows : list of list of str
+        Cells as they are shown.
+    """
+
+    title: str
+    columns: list[str]
+    rows: list[list[str]]
+
+
+def number(value: float, digits: int = 4) -> str:
+    """Return a number as text."""
+    return MISSING if np.isnan(value) else f"{value:.{digits}g}"
+
+
+def share(value: float, digits: int = 4) -> str:
+    """Return a probability, or another share, as text with fixed decimals."""
+    # Adding 0 takes the sign from a rounded 0.
+    return MISSING if np.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def sentence(text: str) -> str:
+    """Return a text with its first letter as a capital."""
+    return text[:1].upper() + text[1:]
+
+
+def mode_label(results: xr.Dataset, mode: int, names: dict[str, str] | None = None) -> str:
+    """Return a mode's number with its pair and its name in a publication."""
+    pair = str(results["pair"].sel(mode=mode).item()) if "pair" in results.coords else ""
+    published = (names or {}).get(str(mode))
+    label = f"{mode} (pair {pair})" if "-" in pair else str(mode)
+    return f"{label}, paper {published}" if published else label
+
+
+def with_limits(results: xr.Dataset, name: str, decimals: int | None = None) -> str:
+    """Return a scalar with its limits, where it has some, such as ``0.470 (0.441 to 0.502)``.
+
+    Parameters
+    ----------
+    results : Dataset
+    name : str
+        The variable; its limits end in ``_low`` and ``_high``.
+    decimals : int, optional
+        Fixed decimals; four significant digits by default.
+    """
+    ends = [f"{name}_{end}" for end in ("low", "high")]
+    keys = [name, *(ends if all(end in results for end in ends) else [])]
+    values = [float(results[key]) for key in keys]
+    middle, *limits = (number(value) if decimals is None else share(value, decimals) for value in values)
+    known = bool(limits) and not np.isnan(values[1:]).any()
+    return f"{middle} ({limits[0]} to {limits[1]})" if known else middle
+
+
+def with_unit(text: str, values: xr.DataArray) -> str:
+    """Return a text with the unit of a variable in brackets; pure numbers have none."""
+    units = str(values.attrs.get("units", "1"))
+    return text if units in ("", "1", "(1)^2") else f"{text} [{units}]"

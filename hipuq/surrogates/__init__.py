@@ -1,0 +1,1 @@
+"""Surrogates: fitted to outcomes, held against true values, told as labelled results."""
