@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -37,6 +37,30 @@ def save_results(results: xr.DataTree | xr.Dataset, path: str | os.PathLike[str]
     with _reported("write", file):
         file.parent.mkdir(parents=True, exist_ok=True)
         tree.to_netcdf(part, engine="h5netcdf")
+        part.replace(file)
+
+
+def add_results(groups: Mapping[str, xr.Dataset], path: str | os.PathLike[str]) -> None:
+    """Add groups to a results file; the old file stays until the new one is complete.
+
+    Parameters
+    ----------
+    groups : mapping of Dataset
+        By name, such as ``"printed/any_unstable"``; none that the file has already.
+    path : path
+        A file that `save_results` wrote.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be read or written.
+    """
+    file = Path(path)
+    part = file.with_name(file.name + ".part")
+    with _reported("write", file):
+        shutil.copyfile(file, part)
+        for name, dataset in groups.items():
+            dataset.to_netcdf(part, mode="a", group=name, engine="h5netcdf")
         part.replace(file)
 
 

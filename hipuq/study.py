@@ -26,7 +26,7 @@ from hipuq.methods import Method
 from hipuq.models import MODELS, CEAModel
 from hipuq.models.oscillator_ring import OscillatorRing
 from hipuq.sampling import seed_of
-from hipuq.store import RESULTS_NAME, load_results, save_outcomes, save_results
+from hipuq.store import RESULTS_NAME, add_results, load_results, save_outcomes, save_results
 from hipuq.study_file import ReportTable, StudyFile, read_study_file
 from hipuq.variation import Variation
 
@@ -193,12 +193,19 @@ def run_study(
             progress=progress,
         )
         save_outcomes(outcomes, folder / "outcomes" / f"{analysis.name}.zarr")
-        for of in analysis.of:
-            groups[f"{analysis.name}/{of}"] = method.estimate(
+        found = {
+            f"{analysis.name}/{of}": method.estimate(
                 outcomes, analysis.inputs, of=of, **analysis.options["estimate"]
             )
-        groups |= _at_nominal(analysis, study.report, n_jobs)
-        save_results(xr.DataTree.from_dict(groups), folder / RESULTS_NAME)
+            for of in analysis.of
+        }
+        found |= _at_nominal(analysis, study.report, n_jobs)
+        # An old file gives way to the first results, and not before.
+        if i == 0:
+            save_results(xr.DataTree.from_dict(groups | found), folder / RESULTS_NAME)
+        else:
+            add_results(found, folder / RESULTS_NAME)
+        groups |= found
         open_ = int((outcomes["status"] == schema.STATUS["undecided"]).sum())
         say(
             f"{analysis.name}: {outcomes.sizes['sample']:,} evaluations of {analysis.model.label} in "

@@ -7,6 +7,7 @@ import xarray as xr
 
 import hipuq
 from hipuq.errors import StoreError
+from hipuq.store import add_results
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +48,26 @@ def test_results_come_back_identical(outcomes, tmp_path):
     xr.testing.assert_identical(tree, hipuq.load_results(tmp_path / "sub" / "results.nc"))
     xr.testing.assert_identical(tree, hipuq.load_results(tmp_path / "sub"))
     assert not list((tmp_path / "sub").glob("*.part"))
+
+
+def test_results_can_be_added(outcomes, tmp_path):
+    """Group by group gives the same file as all at once, order included; a failure leaves the old file."""
+    inputs = hipuq.Inputs.from_json(outcomes.attrs["inputs"])
+    results = {
+        name: hipuq.estimate("monte_carlo", outcomes, inputs, of=name.split("/")[1])
+        for name in ("z/unstable", "z/margin", "a/any_unstable", "a/unstable", "m/margin")
+    }
+    file = tmp_path / "results.nc"
+    root = xr.Dataset(attrs={"title": "study"})
+    hipuq.save_results(xr.DataTree.from_dict({"/": root, "z/unstable": results["z/unstable"]}), file)
+    for name in list(results)[1:]:
+        add_results({name: results[name]}, file)
+    tree, again = xr.DataTree.from_dict({"/": root, **results}), hipuq.load_results(file)
+    xr.testing.assert_identical(tree, again)
+    assert [node.path for node in again.subtree] == [node.path for node in tree.subtree]
+    with pytest.raises(StoreError, match="cannot write"):
+        add_results({"b/y": xr.Dataset({"y": ("x", [object()])})}, file)
+    xr.testing.assert_identical(tree, hipuq.load_results(file))
 
 
 def test_a_store_is_replaced_but_nothing_else(outcomes, tmp_path):

@@ -112,7 +112,8 @@ def index_bars(
     ax.grid(axis="x", linewidth=0.4, alpha=0.5)
     ax.set_xlabel("Sobol index: share of the variance [1]")
     why = reason(indices["ST"]) or reason(indices["S1"])
-    put_title(ax, outcome_of(indices["ST"]), selected(indices["ST"]), f"{UNDEFINED}: {why}" if why else "")
+    undefined = f"{UNDEFINED}: {why}" if why else ""
+    put_title(ax, outcome_of(indices["ST"]), selected(indices["ST"]), _of_surrogate(results), undefined)
     if not none.all():
         legend_below(ax, width=2.1)
     return ax
@@ -173,8 +174,18 @@ def second_order(results: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ax.set_ylim(cells - 0.48, -0.52)
     why = table.attrs.get("undefined", "") if not known.sum() == pairs.sum() else ""
     beneath = f"beneath: {level(results)}" if limits and known.any() else ""
-    put_title(ax, outcome_of(table), selected(table), beneath, f"{UNDEFINED}: {why}" if why else "")
+    undefined = f"{UNDEFINED}: {why}" if why else ""
+    put_title(ax, outcome_of(table), selected(table), _of_surrogate(results), beneath, undefined)
     return ax
+
+
+def _of_surrogate(results: xr.Dataset) -> str:
+    """Return whose variance it is where indices are those of a surrogate that is not to be trusted."""
+    if "trusted" not in results or results["trusted"].ndim or int(results["trusted"]):
+        return ""
+    q2 = float(results["q2"]) if "q2" in results else np.nan
+    explains = f", which explains {max(q2, 0.0):.0%} of that of the outcome" if np.isfinite(q2) else ""
+    return f"of the variance of a surrogate not to be trusted{explains}"
 
 
 def _largest_first(indices: dict[str, xr.DataArray]) -> list[str]:

@@ -59,10 +59,11 @@ def in_words(results: xr.Dataset) -> str:
     Returns
     -------
     str
-        Empty where all indices are undefined.
+        Empty where all indices are undefined, or those of a surrogate that is not to be trusted: its
+        variance is not that of the outcome.
     """
     first, total = results["S1"], results["ST"]
-    if total.ndim != 1 or bool((first.isnull() | total.isnull()).all()):
+    if total.ndim != 1 or bool((first.isnull() | total.isnull()).all()) or surrogate.distrust(results):
         return ""
     top = int(total.where(first.notnull()).argmax("parameter"))
     name = parameter_label(str(total["parameter"].values[top]))

@@ -105,7 +105,7 @@ def _overall(results: xr.Dataset, base: str) -> str:
 def _heading(results: xr.Dataset, name: str) -> str:
     """Return what a row tells, with its unit, and over how many levels it ranges."""
     text = with_unit(SHORT.get(name.removesuffix("_overall"), name), results[name])
-    return f"{text}, over {results[name].size} levels" if results[name].ndim else text
+    return f"{text}, over {results[name].size} levels" if results[name].size > 1 else text
 
 
 def _value(results: xr.Dataset, name: str) -> str:

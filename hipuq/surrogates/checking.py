@@ -250,6 +250,8 @@ class Check:
         q2 = self.q2[k]
         if np.isnan(q2):
             reasons.append("the outcome does not vary in the held-out samples")
+        elif q2 <= 0:
+            reasons.append(f"the surrogate predicts held-out samples no better than their mean (Q2 {q2:.2f})")
         elif q2 < Q2_LEAST:
             reasons.append(
                 f"the surrogate explains {q2:.0%} of the variance of held-out samples, below {Q2_LEAST:.0%}"
