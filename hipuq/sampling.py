@@ -1,11 +1,16 @@
-"""Points in the unit cube, by rows: the same rows whatever the slices they are asked for in."""
+"""Points in the unit cube and samples, by rows: the same rows whatever the slices they are asked for in."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
+from hipuq import schema
 from hipuq.errors import InputError, check_name
+from hipuq.inputs import Inputs
 
 Array = NDArray[np.float64]
 Seed = int | np.integer | np.random.Generator | np.random.SeedSequence | None
@@ -153,3 +158,55 @@ def _random(dimension: int, seed: int, key: tuple[int, ...], rows: slice) -> Arr
         begin = max(rows.start, first)
         points[begin - rows.start : stop - rows.start] = drawn[begin - first :]
     return points
+
+
+def rows_of(total: int, rows: slice | None) -> slice:
+    """Return `rows` with a start and a stop.
+
+    Raises
+    ------
+    InputError
+        If they are not rows of a design of `total` samples.
+    """
+    if rows is None:
+        return slice(0, total)
+    ends = (rows.start, rows.stop) if isinstance(rows, slice) else (rows,)
+    if not isinstance(rows, slice) or not all(isinstance(end, (int, type(None))) for end in ends):
+        raise InputError(f"rows is {rows!r}: it must be a slice of integers, such as slice(0, 100)")
+    start = 0 if rows.start is None else rows.start
+    stop = total if rows.stop is None else rows.stop
+    if rows.step not in (None, 1) or not 0 <= start < stop <= total:
+        raise InputError(f"rows is {rows}: it must be a slice without a step inside 0 to {total}")
+    return slice(start, stop)
+
+
+def samples_by_block(inputs: Inputs, points: Callable[[slice], Array], rows: slice, total: int) -> xr.Dataset:
+    """Return rows of a design, mapped to physical values in fixed blocks.
+
+    Quantile functions that iterate to convergence may stop differently in another company, so each
+    block is always mapped whole.
+
+    Parameters
+    ----------
+    inputs : Inputs
+    points : callable
+        Rows -> points of the unit cube, (rows, dimension).
+    rows : slice
+        The rows wanted.
+    total : int
+        Rows of the whole design.
+
+    Returns
+    -------
+    Dataset
+        Over ``sample``, numbered by row.
+    """
+    parts = []
+    for start in range(rows.start // BLOCK * BLOCK, rows.stop, BLOCK):
+        stop = min(start + BLOCK, total)
+        # The numbers keep the dim where a stratum leaves no other input.
+        part = inputs.samples(points(slice(start, stop))).assign_coords(sample=np.arange(start, stop))
+        parts.append(part.isel(sample=slice(max(rows.start - start, 0), rows.stop - start)))
+    whole = parts[0] if len(parts) == 1 else xr.concat(parts, "sample", data_vars="all", join="exact")
+    numbers = np.arange(rows.start, rows.stop)
+    return whole.assign_coords(sample=("sample", numbers, schema.COORDINATES["sample"].attrs))

@@ -8,35 +8,26 @@ how good the surrogate is, and mend what it says of means and probabilities.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from hipuq import schema
-from hipuq.errors import InputError, SchemaError, check_name
-from hipuq.estimation.results import finished, levels_of
-from hipuq.expansion.germs import Germs
+from hipuq.errors import InputError, SchemaError
+from hipuq.estimation.results import finished
 from hipuq.inputs import Inputs
 from hipuq.intervals import check_confidence
-from hipuq.methods.base import rows_of, samples_by_block
-from hipuq.sampling import SAMPLERS, Seed, check_count, check_size, seed_of, spawn, unit_points
+from hipuq.sampling import Seed, check_count, check_size, seed_of, unit_points
 from hipuq.surrogates.checking import Check
 from hipuq.surrogates.limit_state import limit_state_of, strata_of
 from hipuq.surrogates.summary import summarised
-from hipuq.surrogates.surrogate import FIRST_KEY, Basis, discrete_of, fitted
+from hipuq.surrogates.surrogate import Basis, fitted
+from hipuq.surrogates.training import FIT, HELD_OUT, QUADRATURE, divided, drawn, plan
 
 Array = NDArray[np.float64]
 
-QUADRATURE = "quadrature"
-"""Sampler that takes the nodes of a tensor Gauss rule."""
-
 POPULATION = 2**16
 """Points at which the surrogate itself is evaluated."""
-
-FIT, HELD_OUT = -1, 0
-"""Values of the coordinate ``stratum``: to fit, and held out; from 1 strata of the correction."""
 
 
 def design(
@@ -78,111 +69,17 @@ def design(
     InputError
         If n does not suit the sampler, or `held_out` is not a number from 0.
     """
-    share, levels, held = _plan(inputs, n, sampler, held_out)
     seed = seed_of(rng)
-    name, rest = discrete_of(inputs)
-    size = share * levels
-    wanted = rows_of(size + held, rows)
-    parts = []
-    if wanted.start < size:
-        part = slice(wanted.start, min(wanted.stop, size))
-        made = (
-            _nodes(rest, n, part)
-            if sampler == QUADRATURE
-            else _points(rest, sampler, share, seed, part, size)
-        )
-        if name:
-            level = made["sample"].values // share
-            table = inputs.levels(name)
-            dim = table.attrs["dim"]
-            own = table[[name]].assign_coords({table.attrs["group"]: table[table.attrs["group"]]})
-            drawn = own.drop_vars(dim).isel({dim: level}).rename({dim: "sample"})
-            made = made.assign(drawn.data_vars).assign_coords(drawn.coords)
-        parts.append(made)
-    if wanted.stop > size:
-        part = slice(max(wanted.start, size) - size, wanted.stop - size)
-
-        def points(at: slice) -> Array:
-            return unit_points("random", held, inputs.dimension, seed, (1, 0), at)
-
-        made = samples_by_block(inputs, points, part, held)
-        made = made.assign_coords(sample=made["sample"] + size)
-        if sampler == QUADRATURE:
-            missing = np.full(made.sizes["sample"], np.nan)
-            attrs = schema.COORDINATES["quadrature_weight"].attrs
-            made = made.assign_coords(quadrature_weight=("sample", missing, attrs))
-        parts.append(made)
-    samples = parts[0] if len(parts) == 1 else _together(*parts)
-    fit = samples["sample"].values < size
-    books = {"round": np.zeros(len(fit), np.int64), "stratum": np.where(fit, FIT, HELD_OUT)}
-    books |= {"stratum_weight": np.where(fit, 0.0, 1.0)}
-    samples = samples.assign_coords(
-        {key: ("sample", book, schema.COORDINATES[key].attrs) for key, book in books.items()}
-    )
+    samples = drawn(inputs, n, seed, rows, sampler, held_out)
     options = {"design": {"n": int(n), "sampler": sampler, "held_out": held_out}}
     return schema.stamp(
         samples,
-        f"design chaos, {size + held} samples",
+        f"design chaos, {samples.sizes['sample']} samples",
         method="chaos",
         seed=seed,
         options=options,
         inputs=inputs.to_json(),
     )
-
-
-def _plan(inputs: Inputs, n: int, sampler: str, held_out: float) -> tuple[int, int, int]:
-    """Return samples to fit for each level, levels, and samples held out."""
-    n = check_count("n", n)
-    check_name("sampler", sampler, (*SAMPLERS, QUADRATURE))
-    if isinstance(held_out, bool) or not isinstance(held_out, (int, float)) or not 0 <= held_out < np.inf:
-        raise InputError(f"held_out is {held_out!r}: it is a share of the samples to fit, 0 or more")
-    name, rest = discrete_of(inputs)
-    if sampler == QUADRATURE:
-        share = len(Germs.of(rest).grid(n)[1])
-    else:
-        share = n
-        check_size(sampler, _length(sampler, n))
-    levels = 1
-    if name:
-        table = inputs.levels(name)
-        levels = table.sizes[table.attrs["dim"]]
-    return share, levels, math.ceil(held_out * share * levels)
-
-
-def _length(sampler: str, n: int) -> int:
-    """Return the length of the whole sequence that n points are the first of."""
-    return 1 << (n - 1).bit_length() if sampler == "sobol" else n
-
-
-def _points(rest: Inputs, sampler: str, share: int, seed: int, rows: slice, size: int) -> xr.Dataset:
-    """Return rows of the samples to fit: a design of its own for each level."""
-    length = _length(sampler, share)
-
-    def points(part: slice) -> Array:
-        pieces = []
-        for level in range(part.start // share, -(-part.stop // share)):
-            inside = slice(max(part.start - level * share, 0), min(part.stop - level * share, share))
-            pieces.append(unit_points(sampler, length, rest.dimension, seed, (0, level), inside))
-        return np.concatenate(pieces)
-
-    return samples_by_block(rest, points, rows, size)
-
-
-def _nodes(rest: Inputs, n: int, rows: slice) -> xr.Dataset:
-    """Return rows of the tensor Gauss rule, once more for each level."""
-    germs = Germs.of(rest)
-    nodes, weights = germs.grid(n)
-    number = np.arange(rows.start, rows.stop)
-    place = number % len(nodes)
-    attrs = schema.COORDINATES["quadrature_weight"].attrs
-    return germs.samples(nodes[place]).assign_coords(
-        sample=("sample", number, schema.COORDINATES["sample"].attrs),
-        quadrature_weight=("sample", weights[place], attrs),
-    )
-
-
-def _together(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
-    return xr.concat([first, second[list(first.data_vars)]], "sample", data_vars="all", join="exact")
 
 
 def evaluations(
@@ -206,7 +103,7 @@ def evaluations(
     -------
     int
     """
-    share, levels, held = _plan(inputs, n, sampler, held_out)
+    share, levels, held = plan(inputs, n, sampler, held_out)
     return share * levels + held + check_count("correction", correction, 0)
 
 
@@ -361,7 +258,7 @@ def estimate(
     y = values.values.astype(np.float64).reshape(values.sizes["sample"], -1)
     _check_finite(of, y)
     seed = _seed(outcomes, rng)
-    books = outcomes if "stratum" in outcomes.coords else _divided(outcomes, inputs, held_out, seed)
+    books = outcomes if "stratum" in outcomes.coords else divided(outcomes, inputs, held_out, seed)
     surrogate = fitted(outcomes, y, books["stratum"].values == FIT, inputs, basis, nodes)
     check = Check(surrogate, inputs, books, values, y, state, population, seed, confidence)
     results = summarised(surrogate, check, inputs, groups)
@@ -398,22 +295,3 @@ def _check_finite(of: str, y: Array) -> None:
             f"{of} is infinite in {infinite} samples ({infinite / len(y):.2%}): no polynomial fits that; "
             "analyse another outcome"
         )
-
-
-def _divided(outcomes: xr.Dataset, inputs: Inputs, held_out: float, seed: int) -> xr.Dataset:
-    """Return samples that say nothing of their use with a random part held out, level by level."""
-    _plan(inputs, 1, "random", held_out)
-    size = outcomes.sizes["sample"]
-    levels, place = levels_of(outcomes, inputs)
-    share = np.ones(1) if levels is None else levels["weight"].values
-    stratum, weight = np.full(size, FIT), np.zeros(size)
-    rng = spawn(seed, FIRST_KEY, 2)
-    for level in range(len(share)):
-        own = np.flatnonzero(place == level)
-        held = rng.permutation(own)[: math.ceil(len(own) * held_out / (1 + held_out))]
-        stratum[held], weight[held] = HELD_OUT + level, share[level]
-    return outcomes.assign_coords(
-        round=("sample", np.zeros(size, np.int64)),
-        stratum=("sample", stratum),
-        stratum_weight=("sample", weight),
-    )

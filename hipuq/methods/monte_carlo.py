@@ -18,8 +18,16 @@ from hipuq.estimation.reduction import moments
 from hipuq.estimation.results import ENDS, Kind, finished, kind_of, labelled, levels_of, with_summaries
 from hipuq.inputs import Inputs
 from hipuq.intervals import check_confidence
-from hipuq.methods.base import rows_of, samples_by_block
-from hipuq.sampling import SAMPLERS, Seed, check_count, check_size, seed_of, unit_points
+from hipuq.sampling import (
+    SAMPLERS,
+    Seed,
+    check_count,
+    check_size,
+    rows_of,
+    samples_by_block,
+    seed_of,
+    unit_points,
+)
 
 Array = NDArray[np.float64]
 

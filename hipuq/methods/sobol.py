@@ -19,10 +19,9 @@ from hipuq.estimation.indices import labelled, symmetric, undefined
 from hipuq.estimation.results import ENDS, Kind, finished, kind_of
 from hipuq.inputs import Inputs
 from hipuq.intervals import check_confidence
-from hipuq.methods.base import rows_of, samples_by_block
 from hipuq.saltelli.decomposition import base, indices, reason
 from hipuq.saltelli.layout import Layout, check_flag, layout_of
-from hipuq.sampling import Seed, check_count, seed_of, spawn, unit_points
+from hipuq.sampling import Seed, check_count, rows_of, samples_by_block, seed_of, spawn, unit_points
 
 Array = NDArray[np.float64]
 
