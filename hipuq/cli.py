@@ -124,9 +124,13 @@ def list_(what: Annotated[str, typer.Argument(help="models or methods")]) -> Non
             typer.echo(f"{name}: presets {', '.join(PRESETS[name])}")
     elif what == "methods":
         from hipuq.methods import METHODS
+        from hipuq.methods.base import STAGES
 
         for name, method in METHODS.items():
-            options = {**method.options("design"), **method.options("estimate")}
+            options: dict[str, object] = {}
+            for stage in STAGES:
+                # Several may take the same option: its first default is told.
+                options = options | {k: v for k, v in method.options(stage).items() if k not in options}
             text = ", ".join(f"{key}={value!r}" for key, value in options.items())
             typer.echo(f"{name}: {method.title}; options {text}")
     else:

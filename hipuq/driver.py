@@ -82,6 +82,7 @@ def estimate(
     Dataset
     """
     _check_inputs(inputs)
+    _check_of(of)
     record = method_named(method)
     record.check("estimate", options)
     return record.estimate(outcomes, inputs, of=of, rng=rng, **options)
@@ -127,8 +128,10 @@ def run(
         Results, as from `estimate`.
     """
     _check_inputs(inputs)
+    _check_of(of)
     record = method_named(method)
     stages = record.split(options)
+    record.plan(inputs, n, [of], stages)
     outcomes = completed(
         model,
         inputs,
@@ -202,6 +205,11 @@ def with_bounds(of: Iterable[str], model: Callable[..., xr.Dataset]) -> list[str
     known = getattr(model, "outcomes", ())
     bounds = [f"{name}_{end}" for name in names for end in ("low", "high")]
     return [*names, *(name for name in bounds if name in known)]
+
+
+def _check_of(of: object) -> None:
+    if not isinstance(of, str):
+        raise InputError(f"of is {of!r}: it must be the name of one outcome, such as 'margin'")
 
 
 def _check_inputs(inputs: object) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import time
@@ -201,7 +202,7 @@ def together(first: xr.Dataset, more: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     Dataset
-        With the attributes of the first one and the seconds of both.
+        With the attributes of the first one, but seconds and options of both.
     """
     variables: dict[Any, Any] = {}
     for name, values in first.variables.items():
@@ -220,7 +221,8 @@ def together(first: xr.Dataset, more: xr.Dataset) -> xr.Dataset:
     data = {name: values for name, values in variables.items() if name in first.data_vars}
     coords = {name: values for name, values in variables.items() if name in first.coords}
     seconds = sum(float(part.attrs.get("seconds", np.nan)) for part in (first, more))
-    return xr.Dataset(data, coords, first.attrs).assign_attrs(seconds=seconds)
+    options = {**json.loads(more.attrs.get("options", "{}")), **json.loads(first.attrs.get("options", "{}"))}
+    return xr.Dataset(data, coords, first.attrs).assign_attrs(seconds=seconds, options=json.dumps(options))
 
 
 def _padded(arrays: list[NDArray[Any]], axis: int) -> list[NDArray[Any]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -70,7 +72,11 @@ def student(mean: Array, squares: Array, n: Array, confidence: float) -> tuple[A
 
 
 def combined(
-    table: xr.Dataset, weight: str, dim: str, spread: float | xr.DataArray = 0.0
+    table: xr.Dataset,
+    weight: str,
+    dim: str,
+    spread: float | xr.DataArray = 0.0,
+    confidence: float | None = None,
 ) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
     """Return a weighted mean of independent estimates over `dim`, with its interval.
 
@@ -79,15 +85,21 @@ def combined(
     goes so: what is unknown may be all on one side, so limits are measured from the estimates with
     every unknown counted as 0 (``floor``) and as 1 (``ceiling``).
 
+    Shares of few draws in many strata make that interval too narrow on the side of rare events (in 8 strata
+    of 16 draws at a share of 0.01, 95 % limits hold in 87 %). So for shares it is widened to the
+    Wilson interval of as many draws as have the variance of the whole.
+
     Parameters
     ----------
     table : Dataset
-        ``estimate``, ``low``, ``high``, ``floor``, ``ceiling`` and the weights.
+        ``estimate``, ``low``, ``high``, ``floor``, ``ceiling`` and the weights; ``draws`` of shares.
     weight : str
         Name of the weights over `dim`; they need not add up to 1.
     dim : str
     spread : float or DataArray, default 0
         Half-width of one more independent error of the whole, such as that of the weights.
+    confidence : float, optional
+        Of the limits, where the estimates are shares of ``draws``.
 
     Returns
     -------
@@ -100,10 +112,33 @@ def combined(
     def total(part: xr.DataArray) -> xr.DataArray:
         return part.where(used, 0.0).sum(dim, skipna=False)
 
-    below = (total((share * (table["floor"] - table["low"])) ** 2) + spread**2) ** 0.5
-    above = (total((share * (table["high"] - table["ceiling"])) ** 2) + spread**2) ** 0.5
-    return (
-        total(share * table["estimate"]),
-        total(share * table["floor"]) - below,
-        total(share * table["ceiling"]) + above,
-    )
+    ends = []
+    for side, (limit, start) in enumerate((("low", "floor"), ("high", "ceiling"))):
+        middle = total(share * table[start])
+        reach = total((share * (table[limit] - table[start])) ** 2) ** 0.5
+        if confidence is not None:
+            pooled = _pooled_reach(table, total, share, start, side, confidence)
+            reach = reach.where(~(pooled > reach), pooled)
+        reach = (reach**2 + spread**2) ** 0.5
+        ends.append(middle + (reach if side else -reach))
+    return total(share * table["estimate"]), ends[0], ends[1]
+
+
+def _pooled_reach(
+    table: xr.Dataset,
+    total: Callable[[xr.DataArray], xr.DataArray],
+    share: xr.DataArray,
+    start: str,
+    side: int,
+    confidence: float,
+) -> xr.DataArray:
+    """Return the distance to the Wilson limit of as many draws as have the variance of the whole.
+
+    NaN where there is none: no stratum of more than one draw varies.
+    """
+    p, draws = table[start], table["draws"]
+    spread = (p * (1 - p) / (draws - 1)).where(draws > 1, 0.0)
+    whole, variance = total(share * p), total(share**2 * spread)
+    n = (whole * (1 - whole) / variance.where(variance > 0)).where(whole * (1 - whole) > 0)
+    limit = wilson((whole * n).fillna(0.0).values, n.fillna(0.0).values, confidence)[side]
+    return abs(whole.copy(data=limit) - whole).where(n.notnull())

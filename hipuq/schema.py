@@ -142,6 +142,10 @@ COORDINATES: dict[str, Variable] = {
 """Coordinates and dims."""
 
 
+RESULT_DIMS = ("parameter", "parameter_2", "budget", "quantile", "held_out", "element", "term", "count")
+"""Dims of results that no outcome may have."""
+
+
 def is_exact(results: xr.Dataset) -> bool:
     """Say whether results have no sampling error: limits that hold with a confidence of 1."""
     return bool(results.attrs.get("confidence") == 1)
@@ -263,7 +267,8 @@ def check_outcomes(outcomes: xr.Dataset, of: str) -> xr.DataArray:
     Raises
     ------
     SchemaError
-        If there is no ``sample`` dim, or the variable does not hold numbers.
+        If there is no ``sample`` dim, another one is used by results, or the variable does not hold
+        numbers.
     UnknownNameError
         If there is no such variable.
     """
@@ -271,6 +276,9 @@ def check_outcomes(outcomes: xr.Dataset, of: str) -> xr.DataArray:
         raise SchemaError(f"outcomes must be an xarray Dataset, not {type(outcomes).__name__}")
     check_name("outcome", of, [str(name) for name in outcomes.data_vars])
     values = outcomes[of]
+    taken = [str(dim) for dim in values.dims if dim in RESULT_DIMS]
+    if taken:
+        raise SchemaError(f"outcome {of!r} has the dim {taken[0]!r}, which results use: rename it")
     if "sample" not in values.dims:
         raise SchemaError(f"outcome {of!r} needs the dim 'sample', it has {values.dims}")
     if values.sizes["sample"] == 0:

@@ -258,7 +258,7 @@ def _analysis(table: StudyFile, name: str) -> Analysis:
     options = method.split(entry.options)
     for of in entry.of:
         check_name("outcome in of", of, model.outcomes)
-    evaluations = method.evaluations(inputs, entry.n, **options["evaluations"])
+    evaluations = method.plan(inputs, entry.n, entry.of, options)
     _check_report(table.report, base)
     return Analysis(name, model, inputs, entry.method, entry.n, tuple(entry.of), options, evaluations)
 

@@ -11,7 +11,10 @@ import hipuq
 
 @dataclass(frozen=True)
 class Known:
-    """A function and what is known of it; indices by parameter in the order of the inputs."""
+    """A function and what is known of it; indices by parameter in the order of the inputs.
+
+    Second-order ones are a symmetric matrix without a diagonal.
+    """
 
     inputs: hipuq.Inputs
     model: object
@@ -19,6 +22,7 @@ class Known:
     variance: float
     first: np.ndarray
     total: np.ndarray
+    second: np.ndarray
 
 
 def ishigami(a: float = 7.0, b: float = 0.1) -> Known:
@@ -36,7 +40,10 @@ def ishigami(a: float = 7.0, b: float = 0.1) -> Known:
     both = b**2 * np.pi**8 * (1 / 18 - 1 / 50)
     variance = one + two + both
     first, total = np.array([one, two, 0.0]) / variance, np.array([one + both, two, both]) / variance
-    return Known(inputs, model, a / 2, variance, first, total)
+    second = np.full((3, 3), np.nan)
+    for (i, j), value in {(0, 1): 0.0, (0, 2): both / variance, (1, 2): 0.0}.items():
+        second[i, j] = second[j, i] = value
+    return Known(inputs, model, a / 2, variance, first, total, second)
 
 
 def sobol_g(a: tuple[float, ...] = (0.0, 1.0, 4.5)) -> Known:
@@ -55,4 +62,6 @@ def sobol_g(a: tuple[float, ...] = (0.0, 1.0, 4.5)) -> Known:
     own = 1 / (3 * (1 + np.array(a)) ** 2)
     variance = np.prod(1 + own) - 1
     total = own * np.prod(1 + own) / (1 + own) / variance
-    return Known(inputs, model, 1.0, variance, own / variance, total)
+    second = np.outer(own, own) / variance
+    np.fill_diagonal(second, np.nan)
+    return Known(inputs, model, 1.0, variance, own / variance, total, second)

@@ -21,6 +21,11 @@ ELEMENTS = [
     "contact",
 ]
 REASON = "the outcome does not vary; its variance is 0"
+SENTENCE = (
+    "Stability margin (negative: unstable): friction explains 47 % (44 to 50 %) of the variance alone, "
+    "84 % (81 to 87 %) with its interactions; the 6 parameters alone explain 51 % together"
+)
+"""What is said of the indices of `sobol`."""
 
 
 def attrs(name, outcome=OUTCOME):
@@ -155,3 +160,10 @@ def by_mode(results, modes=(16, 17, 18)):
                 values.attrs["undefined"] = f"mode {modes[0]}: the outcome does not vary"
             made[name] = values.assign_attrs(results[name].attrs | values.attrs)
     return made
+
+
+def tree(**groups):
+    """Return the results of analyses as the tree of a study."""
+    attrs = {key: "" for key in ("title", "description", "study", "seed", "study_file", "hipuq_version")}
+    root = xr.Dataset(attrs=attrs | {"report": "{}"})
+    return xr.DataTree.from_dict({"/": root} | {f"{name}/margin": one for name, one in groups.items()})

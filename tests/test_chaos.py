@@ -37,11 +37,10 @@ def test_ishigami():
 
 
 def test_sobol_g():
-    """Its kinks leave a polynomial of degree 10 short of 0.2 % of the variance of each factor."""
     known = sobol_g()
     results = run(known.model, known.inputs, 1500, degree=10)
-    assert results["S1"].values == pytest.approx(known.first, abs=5e-3)
-    assert results["ST"].values == pytest.approx(known.total, abs=5e-3)
+    assert results["S1"].values == pytest.approx(known.first, abs=2e-3)
+    assert results["ST"].values == pytest.approx(known.total, abs=2e-3)
 
 
 @pytest.mark.parametrize("fit", ["least_squares", "sparse"])
@@ -72,7 +71,7 @@ def test_quadrature_is_exact_for_polynomials():
     assert int(results["samples_used"]) == 16
     with pytest.raises(hipuq.HipuqError, match="10 quadrature nodes for each of 9 inputs"):
         run(model, hipuq.Inputs(**{f"x{i}": cp.Uniform(0, 1) for i in range(9)}), 10, sampler="quadrature")
-    with pytest.raises(hipuq.HipuqError, match="sampler='quadrature'"):
+    with pytest.raises(hipuq.HipuqError, match="needs the sampler 'quadrature', not 'sobol'"):
         run(model, inputs, 64, fit="quadrature")
     with pytest.raises(hipuq.HipuqError, match="degree is 5"):
         run(model, inputs, 4, sampler="quadrature", degree=5)
@@ -249,7 +248,7 @@ def test_the_correction_is_a_second_round():
     assert results.sizes["held_out"] == 10
     again = run(line, LINE, 50, limit=0.0, correction=160)
     assert results.drop_vars("seconds").equals(again.drop_vars("seconds"))
-    with pytest.raises(hipuq.HipuqError, match="128 true evaluations or more, or 0"):
+    with pytest.raises(hipuq.HipuqError, match="0 or 128 to 6553 true evaluations"):
         run(line, LINE, 50, limit=0.0, correction=100)
     with pytest.raises(hipuq.HipuqError, match="needs a limit state"):
         run(line, LINE, 50, correction=160)
@@ -302,7 +301,7 @@ def test_unknown_outcomes_are_left_out_and_widen_probabilities():
 def test_nothing_known():
     results = run(constant(np.nan), LINE, 40, limit=0.0)
     assert all(np.isnan(results[name]).all() for name in ("mean", "variance", "S1", "q2", "probability"))
-    assert results["S1"].attrs["undefined"].startswith("no sample")
+    assert results["S1"].attrs["undefined"].startswith("too few samples have a known outcome")
     assert float(results["probability_low"]) == 0.0 and float(results["probability_high"]) == 1.0
     assert int(results["trusted"]) == 0
 

@@ -87,8 +87,17 @@ def test_lists(monkeypatch, capsys):
     assert "oberst2016-calibrated" in said
     assert "hulten" in said
     _, said, _ = call(monkeypatch, capsys, "list", "methods")
-    assert "monte_carlo" in said
-    assert "stratify" in said
+    lines = dict(line.split(": ", 1) for line in said.splitlines())
+    assert set(lines) == {"monte_carlo", "sobol", "chaos"}
+    assert "stratify=False" in lines["monte_carlo"]
+    # An option of one stage alone, and one of several with another default in each.
+    for name, option in (
+        ("chaos", "correction=0"),
+        ("chaos", "held_out=0.2"),
+        ("sobol", "second_order=False"),
+    ):
+        assert lines[name].count(f"{option.split('=')[0]}=") == 1
+        assert option in lines[name].partition("options ")[2].split(", ")
 
 
 @pytest.mark.parametrize(

@@ -211,7 +211,8 @@ def test_intervals_of_strata_add_up_in_squares():
     results = stratified(values, (0.75, 0.25))
     half = float(results["probability_high"][0] - results["probability"][0])
     overall = float(results["probability_overall_high"] - results["probability_overall"])
-    assert overall == pytest.approx(half / 2)
+    # Wilson's limits of the four together are a little further off than those of one in squares.
+    assert half / 2 < overall < 1.01 * half / 2
 
 
 def test_outcomes_of_other_strata_are_refused():

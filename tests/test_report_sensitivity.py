@@ -1,32 +1,22 @@
-"""Sobol indices and polynomial chaos in words, tables, pictures and on the page."""
+"""Sobol indices and polynomial chaos in words and tables."""
 
 import io
 
-import chaospy as cp
 import numpy as np
 import pytest
 import xarray as xr
-from index_results import NAMES, OUTCOME, REASON, by_mode, chaos, sobol, variable
+from index_results import OUTCOME, REASON, SENTENCE, by_mode, chaos, sobol, tree, variable
 from rich.console import Console
 
-import hipuq
-from hipuq.report.figures import pictures
-from hipuq.report.page import content, write_report
 from hipuq.report.sensitivity import has_indices, in_words, note, remarks
 from hipuq.report.summary import estimates, headline, tables
 from hipuq.report.text import show_results
 
 NAN = [np.nan] * 6
-SENTENCE = (
-    "Stability margin (negative: unstable): friction explains 47 % of the variance alone, 84 % with its "
-    "interactions; the 6 parameters alone explain 51 % together"
+OF_SURROGATE = (
+    "The surrogate of stability margin (negative: unstable): friction explains 47 % of the variance alone, "
+    "84 % with its interactions; the 6 parameters alone explain 51 % together"
 )
-
-
-def tree(**groups):
-    attrs = {key: "" for key in ("title", "description", "study", "seed", "study_file", "hipuq_version")}
-    root = xr.Dataset(attrs=attrs | {"report": "{}"})
-    return xr.DataTree.from_dict({"/": root} | {f"{name}/margin": one for name, one in groups.items()})
 
 
 def shown(results):
@@ -60,7 +50,7 @@ def levels():
 def test_the_most_telling_parameter_in_words():
     assert in_words(sobol()) == SENTENCE
     assert headline(sobol()) == SENTENCE
-    assert SENTENCE in remarks(chaos())
+    assert OF_SURROGATE in remarks(chaos())
 
 
 @pytest.mark.parametrize(
@@ -70,17 +60,67 @@ def test_the_most_telling_parameter_in_words():
             ["friction"],
             [0.98],
             [1.01],
-            "friction explains 98 % of the variance alone, 101 % with its interactions",
+            "friction explains 98 % (95 to 101 %) of the variance alone, 101 % (98 to 104 %) with",
         ),
-        (["k1", "k2"], [-0.02, 0.0], [0.3, 0.9], "k2 explains none of the variance alone, 90 % with"),
-        (["spring_stiffness[3]", "k1"], [0.2, 0.1], [0.5, 0.4], "spring stiffness 3 explains 20 %"),
-        (["k1", "k2"], [np.nan, 0.1], [0.8, 0.7], "k2 explains 10 % of the variance alone, 70 % with"),
+        (
+            ["k1", "k2"],
+            [-0.02, 0.0],
+            [0.3, 0.9],
+            "k2 explains none (-3 to 3 %) of the variance alone, 90 % (87 to 93 %) with",
+        ),
+        (
+            ["spring_stiffness[3]", "k1"],
+            [0.2, 0.1],
+            [0.5, 0.4],
+            "spring stiffness 3 explains 20 % (17 to 23 %)",
+        ),
+        (
+            ["k1", "k2"],
+            [np.nan, 0.1],
+            [0.8, 0.7],
+            "k2 explains 10 % (7 to 13 %) of the variance alone, 70 % (67 to 73 %) with",
+        ),
     ],
 )
 def test_words_of_others(names, first, total, said):
     text = in_words(sobol(names, first, total))
     assert said in text
     assert ("together" in text) is (len(names) > 1 and not np.isnan(first).any())
+
+
+def test_wide_intervals_resolve_nothing():
+    results = sobol(["k1", "contact_angle"], [0.1, -0.02], [0.5, 1.06], width=0.1)
+    results["ST_low"][1], results["ST_high"][1] = 0.4, 2.95
+    assert in_words(results) == (
+        f"{OUTCOME.capitalize()}: the indices are not resolved: the total-order index of contact angle lies "
+        "between 0.40 and 2.95; more samples are needed"
+    )
+    results["ST_high"][1] = 0.69
+    assert "contact angle explains none (-12 to 8 %) of the variance alone" in in_words(results)
+
+
+@pytest.mark.parametrize(
+    ("total", "said"),
+    [
+        ([0.84, 0.5, 0.4, 0.3, 0.2, 0.77], ""),
+        ([0.84, 0.5, 0.4, 0.3, 0.2, 0.79], "that of contact angle"),
+        ([0.84, 0.8, 0.4, 0.3, 0.8, 0.8], "those of contact, spring angle and contact angle"),
+        ([0.84, 0.8, 0.8, 0.8, 0.8, 0.8], "those of contact, spring stiffness and 3 others"),
+    ],
+)
+def test_a_parameter_that_may_not_be_the_first_is_not_called_so(total, said):
+    open_ = f" with its interactions, which is not certain to be the most: the interval overlaps {said};"
+    text = in_words(sobol(total=total))
+    assert (open_ if said else " with its interactions;") in text
+    assert "friction explains" in text
+
+
+def test_unknown_limits_are_not_told():
+    results = sobol()
+    for name in ("S1", "ST"):
+        for end in ("low", "high"):
+            results[f"{name}_{end}"] = results[f"{name}_{end}"] * np.nan
+    assert "friction explains 47 % of the variance alone, 84 % with its interactions;" in in_words(results)
 
 
 def test_no_words_for_what_is_undefined_or_over_modes():
@@ -148,6 +188,20 @@ def test_indices_by_parameter():
     assert table.rows[3][1:] == ["-0.012 (-0.042 to 0.018)", "0.330 (0.300 to 0.360)"]
     assert tables(chaos())[0].rows[0] == ["friction", "0.470", "0.840"]
     assert tables(chaos())[0].columns == ["parameter", "S1", "ST"]
+
+
+def test_indices_of_a_surrogate_are_called_so():
+    def titles(results):
+        return [table.title for table in tables(results)]
+
+    one, pairs = titles(chaos())[0], titles(chaos())[-1]
+    assert one == f"Sobol indices of the surrogate of {OUTCOME}: alone (S1) and with interactions (ST)"
+    assert pairs.startswith(f"Second-order index of the surrogate of {OUTCOME}")
+    assert titles(by_mode(chaos()))[:2] == [
+        f"{order}-order index of the surrogate of {OUTCOME}" for order in ("Total", "First")
+    ]
+    assert not any("surrogate" in title for title in titles(sobol()) + titles(by_mode(sobol())))
+    assert f"Sobol indices of the surrogate of {OUTCOME}" in " ".join(" ".join(shown(chaos())).split())
 
 
 def test_undefined_indices_are_not_numbers():
@@ -268,116 +322,3 @@ def test_screen_of_modes_and_of_nothing():
 def test_results_of_indices_alone_are_found():
     bare = sobol()[["S1", "ST", "evaluations", "failed", "undecided", "seconds"]]
     assert [of for of, _ in estimates(tree(one=bare), "one")] == ["margin"]
-
-
-# Pictures and page
-
-
-def names(results):
-    found = list(pictures(tree(one=results)))
-    for picture in found:
-        picture.figure.draw_without_rendering()
-        assert picture.caption.endswith(".")
-    return [picture.name for picture in found]
-
-
-def test_a_picture_for_each_thing_there_is():
-    assert names(sobol()) == ["indices_margin", "second_order_margin", "convergence_margin"]
-    assert names(chaos()) == ["indices_margin", "second_order_margin", "surrogate_margin"]
-    assert names(sobol(second=False)) == ["indices_margin", "convergence_margin"]
-    assert names(sobol(["k1"], [0.9], [1.0])) == ["indices_margin", "convergence_margin"]
-    assert names(sobol(first=NAN, total=NAN)) == names(sobol())
-
-
-def test_modes_have_no_pictures():
-    assert names(by_mode(sobol())) == names(by_mode(chaos())) == []
-
-
-def test_both_orders_of_indices_converge_side_by_side():
-    picture = list(pictures(tree(one=sobol())))[-1]
-    said = [ax.get_ylabel().split("-order")[0] for ax in picture.figure.axes]
-    assert said == ["first", "total"]
-
-
-def test_convergence_of_a_probability():
-    said = {"long_name": "probability: any mode unstable", "units": "1"}
-    results = xr.Dataset(coords={"budget": [100, 200]}, attrs={"confidence": 0.95, "of": "margin"})
-    for end in ("", "_low", "_high"):
-        results[f"probability_by_budget{end}"] = ("budget", [0.4, 0.5], said)
-    assert names(results) == ["convergence_margin"]
-    assert names(results.expand_dims(mode=[1, 2])) == []
-
-
-def test_the_page_says_what_intervals_mean(tmp_path):
-    root = tree(drawn=sobol(), fitted=chaos(trusted=0))
-    drawn, fitted = content(root, {})["sections"]
-    assert "95% percentile limits of a bootstrap" in drawn["note"]
-    assert "limits from true evaluations" in fitted["note"]
-    page = write_report(root, tmp_path).read_text(encoding="utf-8")
-    text = " ".join(page.split())
-    assert SENTENCE in text
-    assert "counted as stable in the lower limit" not in text
-    assert "The surrogate is not to be trusted: Q2 is 0.41" in text
-    assert "A first-order index (S1) is the share of the variance that goes" in text
-    assert "0.470 (0.440 to 0.500)" in text
-    files = sorted(file.name for file in (tmp_path / "figures").iterdir())
-    assert len(files) == 6
-    assert "fitted-surrogate_margin.png" in files
-
-
-def test_the_page_says_which_outcome_is_undefined():
-    groups = {"one/margin": sobol(), "one/onset": sobol(first=NAN, total=NAN)}
-    (section,) = content(xr.DataTree.from_dict({"/": tree().to_dataset()} | groups), {})["sections"]
-    assert f"onset: Undefined indices: {REASON}" in section["remarks"]
-
-
-def test_parameters_keep_the_names_they_are_selected_by():
-    """Tables of one outcome name parameters as the coordinate does, so that they can be selected."""
-    assert {row[0] for row in tables(sobol())[0].rows} == set(NAMES)
-
-
-# Results as the methods make them
-
-
-@pytest.fixture(scope="module")
-def made():
-    model = hipuq.models.two_dof()
-    inputs = model.inputs(friction=cp.Uniform(0.0, 0.5), k1=hipuq.relative(cp.Uniform(-0.1, 0.1)))
-    plans = {
-        "drawn/margin": {"method": "sobol", "of": "margin", "n": 64, "second_order": True},
-        "verdict/any_unstable": {"method": "sobol", "of": "any_unstable", "n": 64},
-        "modes/growth_rate": {"method": "sobol", "of": "growth_rate", "n": 64},
-        "fitted/margin": {"method": "chaos", "of": "margin", "n": 100},
-        "fitted modes/growth_rate": {"method": "chaos", "of": "growth_rate", "n": 100},
-        "plain/any_unstable": {"method": "monte_carlo", "of": "any_unstable", "n": 200},
-    }
-    groups = {name: hipuq.run(model, inputs, rng=1, **plan) for name, plan in plans.items()}
-    return xr.DataTree.from_dict({"/": tree().to_dataset()} | groups)
-
-
-def test_pictures_of_results_as_they_are_made(made):
-    found = {}
-    for picture in pictures(made):
-        picture.figure.draw_without_rendering()
-        found.setdefault(picture.analysis, []).append(picture.name)
-    assert found == {
-        "drawn": ["indices_margin", "second_order_margin", "convergence_margin"],
-        "verdict": ["indices_any_unstable", "convergence_any_unstable"],
-        "fitted": ["indices_margin", "second_order_margin", "surrogate_margin"],
-        "plain": ["convergence_any_unstable"],
-    }
-
-
-def test_words_of_results_as_they_are_made(made, tmp_path):
-    stream = io.StringIO()
-    show_results(made, Console(file=stream, width=300))
-    text = stream.getvalue()
-    for analysis, method in (("drawn", "sobol"), ("fitted", "chaos"), ("modes", "sobol")):
-        results = next(iter(made[analysis].children.values())).to_dataset()
-        assert f"{analysis}: two_dof(hoffmann2002), {method}, seed 1" in text
-        for line in filter(None, [headline(results), *remarks(results)]):
-            assert line in text
-        assert tables(results)[0].rows
-    assert "friction explains" in headline(made["drawn/margin"].to_dataset())
-    assert "by the surrogate alone" in headline(made["fitted/margin"].to_dataset())
-    assert "How to read this" in write_report(made, tmp_path).read_text(encoding="utf-8")

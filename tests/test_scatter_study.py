@@ -8,6 +8,7 @@ import pytest
 
 import hipuq
 from hipuq.report.page import write_report
+from hipuq.sampling import seed_of
 
 STUDY = Path(__file__).parents[1] / "studies" / "scatter"
 
@@ -25,6 +26,8 @@ SIZES = {
     "sobol_integrated_damped": 4,
     "chaos_integrated_damped": 12,
 }
+
+ENDS = "", "_low", "_high"
 
 PROBABILITY = 0.5093, 0.0011
 """P(any unstable), 200,000 random samples with seed 77, and its standard error."""
@@ -51,6 +54,36 @@ def test_methods_agree_on_the_probability(results):
         assert high - low < 0.05
     integrated = tree["monte_carlo_integrated/probability"]
     assert float(integrated["probability_low"]) < PROBABILITY[0] < float(integrated["probability_high"])
+
+
+@pytest.fixture(scope="module")
+def settled():
+    """Return the indices from 4096 base points, of the samples of the study but those for pairs."""
+    whole = hipuq.load_study(STUDY)
+    ((place, one),) = ((i, one) for i, one in enumerate(whole.analyses) if one.name == "sobol")
+    seed = seed_of(np.random.SeedSequence(whole.seed, spawn_key=(place,)))
+    samples = hipuq.design("sobol", one.inputs, one.n, seed)
+    assert samples.sizes["sample"] == 32_768
+    outcomes = hipuq.evaluate(one.model, samples, keep=list(one.of), progress=False)
+    return {of: hipuq.estimate("sobol", outcomes, one.inputs, of=of) for of in one.of}
+
+
+def test_indices_are_settled_after_1024_base_points(settled):
+    """Those of 4096 lie inside the 95 % intervals of 1024; of one of 24 the intervals overlap."""
+    assert set(settled) == {"any_unstable", "margin"}
+    inside, overlap = [], []
+    for found in settled.values():
+        per_point = found.sizes["parameter"] + 2
+        for name in ("S1", "ST"):
+            early, late = (
+                [found[f"{name}_by_budget{end}"].sel(budget=points * per_point).values for end in ENDS]
+                for points in (1024, 4096)
+            )
+            inside += list((early[1] <= late[0]) & (late[0] <= early[2]))
+            overlap += list((early[1] <= late[2]) & (late[1] <= early[2]))
+    assert len(inside) == 24
+    assert all(overlap)
+    assert sum(inside) >= 23
 
 
 def test_interactions_rule(results):

@@ -10,7 +10,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from hipuq import schema
-from hipuq.errors import SchemaError
 from hipuq.estimation.results import ENDS
 from hipuq.inputs import Inputs
 
@@ -83,16 +82,8 @@ def labelled(
     -------
     Dataset
         Undefined indices have the reason as attribute ``undefined``.
-
-    Raises
-    ------
-    SchemaError
-        If the outcome has a dim that the indices have already.
     """
     extra = [str(dim) for dim in values.dims[1:]]
-    for dim in ("parameter", "parameter_2", "budget"):
-        if dim in extra:
-            raise SchemaError(f"{values.name} has the dim {dim!r}, which its indices have: rename it")
     name = values.attrs.get("long_name", values.name)
     labels = {"parameter": np.array(names), "parameter_2": np.array(names), "budget": budget}
     coords: dict[Any, Any] = {

@@ -30,7 +30,7 @@ def columns(cells: Moments, bounds: list[Moments], kind: Kind, confidence: float
     -------
     dict of str to array
         ``estimate``, ``low``, ``high``, ``floor`` and ``ceiling`` (the estimates with every unknown at its
-        lower and its upper bound), ``known`` and ``variance``, each (strata, ...).
+        lower and its upper bound), ``known``, ``draws`` and ``variance``, each (strata, ...).
     """
     pooled = cells.pooled()
     floor, ceiling = bounds or (cells, cells)
@@ -49,6 +49,7 @@ def columns(cells: Moments, bounds: list[Moments], kind: Kind, confidence: float
         "floor": floor.pooled().mean,
         "ceiling": ceiling.pooled().mean,
         "known": pooled.known,
+        "draws": floor.pooled().known,
         "variance": pooled.variance,
     }
 

@@ -53,6 +53,32 @@ def kind_of(values: xr.DataArray) -> Kind:
     return Kind("mean")
 
 
+def check_independent(outcomes: xr.Dataset, *, strata: bool = False) -> None:
+    """Check that samples are draws of the inputs, as far as their coords tell.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+    strata : bool
+        Whether samples of different strata of a surrogate are welcome too.
+
+    Raises
+    ------
+    SchemaError
+        If they are of a design whose samples share values, or are more frequent in some places.
+    """
+    if "matrix" in outcomes.coords:
+        raise SchemaError(
+            "the outcomes are of a Sobol design, whose samples share values: take those of one matrix, "
+            "outcomes.isel(sample=outcomes.matrix == 0).drop_vars(['block', 'matrix'])"
+        )
+    if not strata and "stratum" in outcomes.coords and (outcomes["stratum"].values != 0).any():
+        raise SchemaError(
+            "the outcomes are of a design of polynomial chaos, whose samples are no plain draws of the "
+            "inputs: take those held out, outcomes.isel(sample=outcomes.stratum == 0)"
+        )
+
+
 def levels_of(outcomes: xr.Dataset, inputs: Inputs) -> tuple[xr.Dataset | None, NDArray[np.intp]]:
     """Return the levels that outcomes of a stratified design are of, and the one of each sample.
 
@@ -124,7 +150,11 @@ def labelled(values: xr.DataArray, kind: Kind, arrays: Mapping[str, xr.DataArray
 
 
 def with_summaries(
-    results: xr.Dataset, levels: xr.Dataset, quantity: str, arrays: Mapping[str, xr.DataArray]
+    results: xr.Dataset,
+    levels: xr.Dataset,
+    quantity: str,
+    arrays: Mapping[str, xr.DataArray],
+    confidence: float | None = None,
 ) -> xr.Dataset:
     """Add what is summed up over levels: overall by weight, and for each group of levels.
 
@@ -138,6 +168,8 @@ def with_summaries(
         ``"probability"`` or ``"mean"``.
     arrays : mapping of DataArray
         ``estimate``, ``low``, ``high``, ``floor`` and ``ceiling`` by level, see `combined`.
+    confidence : float, optional
+        Of the limits, where the estimates are shares of ``draws``, which `arrays` then hold.
 
     Returns
     -------
@@ -155,7 +187,7 @@ def with_summaries(
     def put(key: str, value: xr.DataArray, text: str) -> None:
         results[key] = value.drop_attrs().assign_attrs(long_name=text, units=units)
 
-    overall = combined(table, "weight", dim)
+    overall = combined(table, "weight", dim, confidence=confidence)
     for (end, text), value in zip(ENDS.items(), overall, strict=True):
         put(f"{quantity}_overall{end}", value, f"{what}, weighted over all levels{text}")
     names = np.unique(levels[group].values)
@@ -165,7 +197,7 @@ def with_summaries(
     def by_group(values: list[xr.DataArray]) -> xr.DataArray:
         return xr.concat(values, dim=xr.Variable(group_dim, names), coords="minimal", join="exact")
 
-    plain = [combined(part, "plain", dim) for part in parts]
+    plain = [combined(part, "plain", dim, confidence=confidence) for part in parts]
     for i, (end, text) in enumerate(ENDS.items()):
         value = by_group([triple[i] for triple in plain])
         put(f"{quantity}_mean{end}", value, f"{what}, mean over the levels of a group{text}")
@@ -179,9 +211,30 @@ def with_summaries(
 
 
 def finished(
-    results: xr.Dataset, outcomes: xr.Dataset, inputs: Inputs, *, of: str, method: str, confidence: float
+    results: xr.Dataset,
+    outcomes: xr.Dataset,
+    inputs: Inputs,
+    *,
+    of: str,
+    method: str,
+    confidence: float,
+    **options: object,
 ) -> xr.Dataset:
-    """Return results with counts of evaluations, failures and unknowns, seconds and attributes."""
+    """Return results with counts of evaluations, failures and unknowns, seconds and attributes.
+
+    Parameters
+    ----------
+    results, outcomes : Dataset
+    inputs : Inputs
+    of, method : str
+    confidence : float
+    **options
+        What else the estimate was made with, JSON-able.
+
+    Returns
+    -------
+    Dataset
+    """
     status = outcomes["status"].values if "status" in outcomes else np.zeros(outcomes.sizes["sample"])
     counts = {
         "evaluations": (outcomes.sizes["sample"], "model evaluations", "1"),
@@ -197,7 +250,7 @@ def finished(
         f"estimate {method} of {of}",
         method=method,
         inputs=inputs.to_json(),
-        options={"estimate": {"of": of, "confidence": confidence}},
+        options={"estimate": {"of": of, "confidence": confidence, **options}},
         like=outcomes.attrs,
     )
     results.attrs.pop("seconds", None)

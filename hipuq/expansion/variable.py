@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 ATOMS_MAXIMUM = 100_000
 """Most levels of a discrete distribution that get polynomials of their own."""
 
+PROBED = 4096
+"""Quantiles at which a distribution without a family is looked at for jumps."""
+
 # Points of the unit cube are clipped to these: draws beyond their quantiles do not happen.
 _ENDS = np.array([2.0**-64, 1.0 - 2.0**-53])
 
@@ -159,6 +162,7 @@ def _by_probability(distribution: Distribution, low: float, high: float) -> Germ
     if cdf is None or not np.abs(cdf(quantiles) - PROBES).max() <= 1e-4:
         cdf = _inverse(distribution.ppf)
     probability = cdf
+    _check_continuous(distribution, probability)
 
     def to_draw(germs: Array) -> Array:
         return distribution.ppf(np.clip((germs + 1) / 2, *_ENDS))
@@ -171,6 +175,16 @@ def _by_probability(distribution: Distribution, low: float, high: float) -> Germ
         float(quantiles[-1] - quantiles[0]),
         lambda order: _chaospy.recurrence("Uniform", (-1.0, 1.0), order),
     )
+
+
+def _check_continuous(distribution: Distribution, cdf: Callable[[Array], Array]) -> None:
+    """Raise an InputError for values of positive probability, where F(x) is not uniform."""
+    u = (np.arange(PROBED) + 0.5) / PROBED
+    if np.abs(cdf(distribution.ppf(u)) - u).max() > 2 / PROBED:
+        raise InputError(
+            f"the distribution {distribution.source!r} has values of positive probability, for which there "
+            "are no polynomials here: give a discrete distribution of chaospy or scipy"
+        )
 
 
 def _inverse(ppf: Callable[[Array], Array]) -> Callable[[Array], Array]:

@@ -16,12 +16,14 @@ METHODS: dict[str, Method] = {
         estimate=chaos.estimate,
         evaluations=chaos.evaluations,
         refine=chaos.refine,
+        validate=chaos.validate,
     ),
     "sobol": Method(
         title="Sobol indices",
         design=sobol.design,
         estimate=sobol.estimate,
         evaluations=sobol.evaluations,
+        validate=sobol.validate,
     ),
 }
 """Name of a method -> its functions."""

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import xarray as xr
 
 from hipuq.errors import check_name
+from hipuq.inputs import Inputs
 from hipuq.intervals import check_confidence
 
-STAGES = ("design", "refine", "estimate", "evaluations")
+STAGES = ("design", "refine", "estimate", "evaluations", "validate")
 """Functions of a method that take options."""
 
 
@@ -33,6 +34,9 @@ class Method:
     refine : callable or None
         ``(outcomes, inputs, rng, *, of, **options) -> samples or None``, of a sequential method: what
         else it wants evaluated, None when it has enough.
+    validate : callable or None
+        ``(inputs, n, *, of, **options)``, where `of` names all outcomes to analyse: raises for options that
+        could not be used, before anything is evaluated.
     """
 
     title: str
@@ -40,6 +44,7 @@ class Method:
     estimate: Callable[..., xr.Dataset]
     evaluations: Callable[..., int]
     refine: Callable[..., xr.Dataset | None] | None = None
+    validate: Callable[..., None] | None = None
 
     def options(self, stage: str) -> dict[str, Any]:
         """Return the options of a stage, one of `STAGES`, with their defaults."""
@@ -63,6 +68,29 @@ class Method:
         """
         for name in options:
             check_name(f"option of the {stage} of {self.title}", name, self.options(stage))
+
+    def plan(self, inputs: Inputs, n: int, of: Sequence[str], stages: Mapping[str, Mapping[str, Any]]) -> int:
+        """Return the number of model runs of an analysis that can be made.
+
+        Parameters
+        ----------
+        inputs : Inputs
+        n : int
+            Size of the design.
+        of : sequence of str
+            Outcomes to analyse.
+        stages : mapping
+            Options by stage, as from `split`.
+
+        Raises
+        ------
+        InputError
+            If an option cannot be used.
+        """
+        count = self.evaluations(inputs, n, **stages["evaluations"])
+        if self.validate is not None:
+            self.validate(inputs, n, of=of, **stages["validate"])
+        return count
 
     def split(self, options: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         """Return the options of each stage; several may take the same one.

@@ -8,26 +8,39 @@ how good the surrogate is, and mend what it says of means and probabilities.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import asdict
+
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import InputError, SchemaError
-from hipuq.estimation.results import finished
+from hipuq.estimation.results import check_independent, finished
 from hipuq.inputs import Inputs
 from hipuq.intervals import check_confidence
-from hipuq.sampling import Seed, check_count, check_size, seed_of, unit_points
+from hipuq.sampling import Seed, check_count, seed_of
 from hipuq.surrogates.checking import Check
-from hipuq.surrogates.limit_state import limit_state_of, strata_of
+from hipuq.surrogates.correction import corrections
+from hipuq.surrogates.limit_state import limit_state_of
+from hipuq.surrogates.options import (
+    POPULATION,
+    QUADRATURE,
+    Basis,
+    check_correction,
+    check_groups,
+    check_limit,
+    check_outcomes,
+    check_population,
+    check_terms,
+    without_limit_state,
+)
 from hipuq.surrogates.summary import summarised
-from hipuq.surrogates.surrogate import Basis, fitted
-from hipuq.surrogates.training import FIT, HELD_OUT, QUADRATURE, divided, drawn, plan
+from hipuq.surrogates.surrogate import basis_of, fitted
+from hipuq.surrogates.training import FIT, drawn, plan, with_books
 
 Array = NDArray[np.float64]
-
-POPULATION = 2**16
-"""Points at which the surrogate itself is evaluated."""
 
 
 def design(
@@ -107,6 +120,49 @@ def evaluations(
     return share * levels + held + check_count("correction", correction, 0)
 
 
+def validate(
+    inputs: Inputs,
+    n: int,
+    *,
+    of: Sequence[str],
+    sampler: str = "sobol",
+    correction: int = 0,
+    fit: str | None = None,
+    degree: int | None = None,
+    q: float = 1.0,
+    interaction: int | None = None,
+    limit: float | None = None,
+    population: int = POPULATION,
+    groups: bool = True,
+) -> None:
+    """Check the options of refine and estimate before anything is evaluated.
+
+    Parameters
+    ----------
+    inputs : Inputs
+    n : int
+        As in `design`.
+    of : sequence of str
+        Outcomes to analyse.
+    sampler, correction, fit, degree, q, interaction, limit, population, groups
+        As in `design`, `refine` and `estimate`.
+
+    Raises
+    ------
+    InputError
+        If one cannot be used, or not with the others.
+    """
+    basis = Basis(fit or ("quadrature" if sampler == QUADRATURE else "least_squares"), degree, q, interaction)
+    if basis.fit == QUADRATURE and sampler != QUADRATURE:
+        raise InputError(f"fit 'quadrature' needs the sampler 'quadrature', not {sampler!r}")
+    if sampler != QUADRATURE:
+        check_terms(basis, inputs, n)
+    check_correction(correction, population)
+    check_groups(groups)
+    check_limit(limit)
+    check_outcomes(of, limit, correction)
+
+
 def refine(
     outcomes: xr.Dataset,
     inputs: Inputs,
@@ -148,41 +204,23 @@ def refine(
     InputError
         If the outcome has no limit state, or `correction` is too small.
     """
-    wanted = check_count("correction", correction, 0)
-    if not wanted or (outcomes["round"].values > 0).any():
+    wanted = check_correction(correction, population)
+    if not wanted:
         return None
     values = schema.check_outcomes(outcomes, of)
     state = limit_state_of(values, limit)
     if state is None or values.ndim > 1:
-        raise InputError(
-            f"a correction needs a limit state over samples alone, {of!r} has none: take 'margin', a verdict "
-            "such as 'any_unstable', or give limit="
+        raise without_limit_state(of)
+    if "stratum" not in outcomes.coords:
+        raise SchemaError(
+            "a correction needs outcomes of a design of this method: they have no coord 'stratum'"
         )
-    y = values.values.astype(np.float64)[:, None]
-    stratum = outcomes["stratum"].values
-    basis, nodes = _basis(outcomes, fit, degree, q, interaction)
-    surrogate = fitted(outcomes, y, stratum == FIT, inputs, basis, nodes)
-    held = outcomes.isel(sample=stratum == HELD_OUT)
-    u = unit_points("sobol", population, inputs.dimension, seed_of(rng), (0,), slice(0, population))
-    samples = inputs.samples(u)
-    distance = state.distance(surrogate.at(samples, inputs)[:, 0])
-    checked = state.distance(surrogate.at(held, inputs)[:, 0])
-    number, count = strata_of(distance, checked, state.event(y[stratum == HELD_OUT, 0]), wanted)
-    rows = np.concatenate(
-        [rng.choice(np.flatnonzero(number == k), count[k], replace=False) for k in range(len(count))]
-    )
-    chosen = samples.isel(sample=rows)
-    size = np.bincount(number, minlength=len(count)) / len(number)
-    books = {
-        "sample": outcomes["sample"].values.max() + 1 + np.arange(len(rows)),
-        "round": np.ones(len(rows), np.int64),
-        "stratum": number[rows] + 1,
-        "stratum_weight": size[number[rows]],
-    }
-    chosen = chosen.assign_coords(
-        {key: ("sample", book, schema.COORDINATES[key].attrs) for key, book in books.items()}
-    )
-    return schema.stamp(chosen, f"refine chaos, {len(rows)} samples", like=outcomes.attrs)
+    if (outcomes["round"].values > 0).any():
+        return None
+    basis, nodes = basis_of(outcomes, fit, degree, q, interaction)
+    chosen = corrections(outcomes, inputs, values, state, basis, nodes, wanted, population, seed_of(rng))
+    options = {"refine": {"of": of, "correction": wanted, "population": population, **asdict(basis)}}
+    return schema.stamp(chosen, f"refine chaos, {wanted} samples", options=options, like=outcomes.attrs)
 
 
 def estimate(
@@ -249,20 +287,31 @@ def estimate(
         If the outcome has infinite values, there are too few samples, or an option is not allowed.
     """
     confidence = check_confidence(confidence)
-    check_size("sobol", check_count("population", population))
-    if not isinstance(groups, bool):
-        raise InputError(f"groups is {groups!r}: it must be true (by parameter) or false (by element)")
-    basis, nodes = _basis(outcomes, fit, degree, q, interaction)
+    check_population(population)
+    check_groups(groups)
+    basis, nodes = basis_of(outcomes, fit, degree, q, interaction)
     values = schema.check_outcomes(outcomes, of)
+    check_independent(outcomes, strata=True)
     state = limit_state_of(values, limit)
     y = values.values.astype(np.float64).reshape(values.sizes["sample"], -1)
     _check_finite(of, y)
     seed = _seed(outcomes, rng)
-    books = outcomes if "stratum" in outcomes.coords else divided(outcomes, inputs, held_out, seed)
+    books = with_books(outcomes, inputs, held_out, seed)
     surrogate = fitted(outcomes, y, books["stratum"].values == FIT, inputs, basis, nodes)
     check = Check(surrogate, inputs, books, values, y, state, population, seed, confidence)
-    results = summarised(surrogate, check, inputs, groups)
-    return finished(results, outcomes, inputs, of=of, method="chaos", confidence=confidence)
+    return finished(
+        summarised(surrogate, check, inputs, groups),
+        outcomes,
+        inputs,
+        of=of,
+        method="chaos",
+        confidence=confidence,
+        **asdict(basis),
+        limit=None if state is None else state.limit,
+        population=population,
+        groups=groups,
+        population_seed=seed,
+    )
 
 
 def _seed(outcomes: xr.Dataset, rng: Seed) -> int:
@@ -271,21 +320,6 @@ def _seed(outcomes: xr.Dataset, rng: Seed) -> int:
     if rng is None and isinstance(own, (int, np.integer)):
         return int(own)
     return seed_of(rng)
-
-
-def _basis(
-    outcomes: xr.Dataset, fit: str | None, degree: int | None, q: float, interaction: int | None
-) -> tuple[Basis, Array | None]:
-    """Return what the fit may use, and the quadrature weights where it takes them."""
-    nodes = outcomes.coords.get("quadrature_weight")
-    if fit is None:
-        fit = "least_squares" if nodes is None else QUADRATURE
-    basis = Basis(fit, degree, q, interaction)
-    if fit != QUADRATURE:
-        return basis, None
-    if nodes is None:
-        raise SchemaError("fit 'quadrature' needs quadrature nodes: design with sampler='quadrature'")
-    return basis, nodes.values.astype(np.float64)
 
 
 def _check_finite(of: str, y: Array) -> None:

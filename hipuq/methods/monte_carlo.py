@@ -15,7 +15,16 @@ from hipuq import schema
 from hipuq.errors import InputError, check_name
 from hipuq.estimation.limits import columns
 from hipuq.estimation.reduction import moments
-from hipuq.estimation.results import ENDS, Kind, finished, kind_of, labelled, levels_of, with_summaries
+from hipuq.estimation.results import (
+    ENDS,
+    Kind,
+    check_independent,
+    finished,
+    kind_of,
+    labelled,
+    levels_of,
+    with_summaries,
+)
 from hipuq.inputs import Inputs
 from hipuq.intervals import check_confidence
 from hipuq.sampling import (
@@ -214,9 +223,12 @@ def estimate(
     ------
     InputError
         If the outcome has infinite values or the confidence is not one.
+    SchemaError
+        If the samples are of another method's design and no plain draws of the inputs.
     """
     confidence = check_confidence(confidence)
     values = schema.check_outcomes(outcomes, of)
+    check_independent(outcomes)
     kind = kind_of(values)
     levels, level = levels_of(outcomes, inputs)
     strata = 1 if levels is None else levels.sizes[levels.attrs["dim"]]
@@ -236,7 +248,9 @@ def estimate(
     }
     results = labelled(values, kind, arrays)
     if levels is not None:
-        results = with_summaries(results, levels, kind.quantity, arrays)
+        independent = kind == Kind("probability") and replicates == 1 and confidence < 1
+        level_of_limits = confidence if independent else None
+        results = with_summaries(results, levels, kind.quantity, arrays, level_of_limits)
     else:
         parts = _by_budget(values, _bounds(outcomes, of), replicate, kind, confidence)
         for (end, text), part in zip(ENDS.items(), parts.values(), strict=True):

@@ -7,7 +7,7 @@ limits by a bootstrap over base points.
 
 from __future__ import annotations
 
-import json
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -30,6 +30,9 @@ MAXIMUM_COLUMNS = 21201 // 2
 
 MAXIMUM_POINTS = 2**30
 """Length of scipy's Sobol sequence."""
+
+RESAMPLES_MAXIMUM = 100_000
+"""Most resamples of the bootstrap."""
 
 STREAM = 2**31
 """Key of the stream of the design's seed that the seed of resamples is drawn from."""
@@ -138,6 +141,33 @@ def _plan(inputs: Inputs, n: int, groups: bool, second_order: bool) -> Layout:
     return Layout.of(inputs, groups, second_order)
 
 
+def validate(
+    inputs: Inputs, n: int, *, of: Sequence[str], resamples: int = 1000, minimum_events: int = 50
+) -> None:
+    """Check the options of the estimate before anything is evaluated.
+
+    Parameters
+    ----------
+    inputs : Inputs
+    n : int
+    of : sequence of str
+    resamples, minimum_events
+        As in `estimate`.
+
+    Raises
+    ------
+    InputError
+        If one cannot be used.
+    """
+    _check_options(resamples, minimum_events)
+
+
+def _check_options(resamples: int, minimum_events: int) -> None:
+    if check_count("resamples", resamples, 2) > RESAMPLES_MAXIMUM:
+        raise InputError(f"resamples is {resamples}: at most {RESAMPLES_MAXIMUM} are made")
+    check_count("minimum_events", minimum_events, 0)
+
+
 def estimate(
     outcomes: xr.Dataset,
     inputs: Inputs,
@@ -176,7 +206,8 @@ def estimate(
     second_order : bool, optional
         Whether to estimate indices of pairs; by default where the design has samples for them.
     minimum_events : int, default 50
-        Of an outcome of 0 and 1, how many of each there must be among the samples of A and B.
+        Of an outcome of 0 and 1, how many of each there must be among the samples of A and B; of any other,
+        how many that differ from its commonest value. Near it small first-order indices are rough still.
 
     Returns
     -------
@@ -195,8 +226,7 @@ def estimate(
         If a value is infinite, or an option cannot be used.
     """
     confidence = check_confidence(confidence)
-    resamples = check_count("resamples", resamples, 2)
-    minimum_events = check_count("minimum_events", minimum_events, 0)
+    _check_options(resamples, minimum_events)
     values = schema.check_outcomes(outcomes, of)
     layout = layout_of(outcomes, inputs)
     table, rows = layout.table(values, outcomes)
@@ -206,8 +236,7 @@ def estimate(
     seed = _resampling_seed(rng, outcomes)
 
     sizes = [*(FIRST_BUDGET << k for k in range(31) if FIRST_BUDGET << k < len(rows)), len(rows)]
-    least = minimum_events if verdict else None
-    reasons = [[reason(one, least) for one in table[:, :size]] for size in sizes]
+    reasons = [[reason(one, minimum_events, verdict) for one in table[:, :size]] for size in sizes]
     found = [
         indices(
             table[:, :size],
@@ -222,15 +251,18 @@ def estimate(
     ]
     budget = np.cumsum(rows)[np.array(sizes) - 1]
     results = _labelled(found, reasons, layout, values, budget).assign(_counts(table, values, verdict))
-    results = finished(results, outcomes, inputs, of=of, method="sobol", confidence=confidence)
-    options = json.loads(results.attrs["options"])
-    options["estimate"] |= {
-        "resamples": resamples,
-        "second_order": layout.second_order,
-        "minimum_events": minimum_events,
-        "resampling_seed": seed,
-    }
-    return results.assign_attrs(options=json.dumps(options))
+    return finished(
+        results,
+        outcomes,
+        inputs,
+        of=of,
+        method="sobol",
+        confidence=confidence,
+        resamples=resamples,
+        second_order=layout.second_order,
+        minimum_events=minimum_events,
+        resampling_seed=seed,
+    )
 
 
 def _check_finite(table: Array, samples: int, of: str) -> None:

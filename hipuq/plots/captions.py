@@ -24,6 +24,9 @@ UNDEFINED = "undefined"
 ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 """Name of an element of a parameter, such as ``spring_stiffness[3]``."""
 
+LINES_OF_PART = 2
+"""Lines of each part of a title or a text in place of a drawing; what is cut off ends in an ellipsis."""
+
 SHARE_OF_ROOM = 0.95
 """Length of a line of text by the size of the Axes without its labels."""
 
@@ -101,13 +104,37 @@ def outcome_of(index: xr.DataArray) -> str:
     return str(index.attrs.get("long_name", "")).partition(" index of ")[2]
 
 
+def subject(index: xr.DataArray) -> str:
+    """Return the outcome of an index and what it was selected at, such as ``"frequency, mode 16"``."""
+    return ", ".join(filter(None, [outcome_of(index), selected(index)]))
+
+
 def reason(variable: xr.DataArray) -> str:
     """Return why values of a variable are undefined; empty if none is or nothing is said."""
     said = str(variable.attrs.get("undefined", ""))
     return said if bool(variable.isnull().any()) else ""
 
 
-def wrapped(ax: Axes, text: str, *, upright: bool = False) -> str:
+def distrust(results: xr.Dataset) -> str:
+    """Say in a few words that results are those of a surrogate that is not to be trusted; empty of others.
+
+    Parameters
+    ----------
+    results : Dataset
+        The reasons are the attribute ``reasons`` of its ``trusted``.
+
+    Returns
+    -------
+    str
+        ``"surrogate not to be trusted: Q2 0.32"``.
+    """
+    if "trusted" not in results or results["trusted"].ndim or int(results["trusted"]):
+        return ""
+    q2 = float(results["q2"]) if "q2" in results else np.nan
+    return "surrogate not to be trusted" + (f": Q2 {q2:.2f}" if np.isfinite(q2) else "")
+
+
+def wrapped(ax: Axes, text: str, *, upright: bool = False, lines: int | None = None) -> str:
     """Return a text in lines that are no longer than the Axes are wide.
 
     Parameters
@@ -116,6 +143,8 @@ def wrapped(ax: Axes, text: str, *, upright: bool = False) -> str:
     text : str
     upright : bool, default False
         Whether it is written along the height of the Axes.
+    lines : int, optional
+        Most lines; what is cut off ends in an ellipsis.
 
     Returns
     -------
@@ -123,12 +152,13 @@ def wrapped(ax: Axes, text: str, *, upright: bool = False) -> str:
     """
     room = SHARE_OF_ROOM * inches(ax)[upright] * 72
     # A letter is a little wider than half its size, which is 10 pt.
-    return "\n".join(textwrap.wrap(text, max(20, int(room / 5.5))))
+    width = max(20, int(room / 5.5))
+    return "\n".join(textwrap.wrap(text, width, break_on_hyphens=False, max_lines=lines, placeholder=" …"))
 
 
 def put_title(ax: Axes, *parts: str) -> None:
-    """Write the title of a figure, each part from a new line; empty ones are left out."""
-    lines = [wrapped(ax, part) for part in parts if part]
+    """Write the title of a figure, each part from a new line and cut to two; empty ones are left out."""
+    lines = [wrapped(ax, part, lines=LINES_OF_PART) for part in parts if part]
     ax.set_title("\n".join(lines), fontsize="medium", parse_math=False)
 
 
@@ -139,9 +169,9 @@ def inches(ax: Axes) -> tuple[float, float]:
 
 
 def say(ax: Axes, text: str) -> None:
-    """Write a text in the middle of Axes that have nothing to draw."""
+    """Write a text, cut to two lines, in the middle of Axes that have nothing to draw."""
     style: dict[str, Any] = {"ha": "center", "va": "center", "parse_math": False}
-    ax.text(0.5, 0.5, wrapped(ax, text), transform=ax.transAxes, **style)
+    ax.text(0.5, 0.5, wrapped(ax, text, lines=LINES_OF_PART), transform=ax.transAxes, **style)
 
 
 def legend_below(ax: Axes, width: float = 1.9) -> None:

@@ -22,16 +22,16 @@ from numpy.typing import NDArray
 from hipuq.errors import InputError, check_name
 from hipuq.plots.captions import (
     UNDEFINED,
+    distrust,
     inches,
     legend_below,
     level,
-    outcome_of,
     over,
     parameter_label,
     put_title,
     reason,
     say,
-    selected,
+    subject,
 )
 from hipuq.plots.style import BLACK, BLUE, GREY, ORANGE, new_axes
 
@@ -65,7 +65,7 @@ def index_bars(
     results : Dataset
         Results of the method ``"sobol"`` or ``"chaos"``: ``S1(parameter)`` and ``ST(parameter)`` [1],
         and if there are any their limits ``S1_low`` to ``ST_high``. An index that is undefined (NaN)
-        has no bar but says so.
+        has no bar but says so; the title has the reason, cut to two lines.
     ax : Axes, optional
         Where to draw; by default a new figure, higher the more parameters there are.
     parameters : sequence of str, optional
@@ -113,7 +113,7 @@ def index_bars(
     ax.set_xlabel("Sobol index: share of the variance [1]")
     why = reason(indices["ST"]) or reason(indices["S1"])
     undefined = f"{UNDEFINED}: {why}" if why else ""
-    put_title(ax, outcome_of(indices["ST"]), selected(indices["ST"]), _of_surrogate(results), undefined)
+    put_title(ax, subject(indices["ST"]), distrust(results), undefined)
     if not none.all():
         legend_below(ax, width=2.1)
     return ax
@@ -175,17 +175,8 @@ def second_order(results: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     why = table.attrs.get("undefined", "") if not known.sum() == pairs.sum() else ""
     beneath = f"beneath: {level(results)}" if limits and known.any() else ""
     undefined = f"{UNDEFINED}: {why}" if why else ""
-    put_title(ax, outcome_of(table), selected(table), _of_surrogate(results), beneath, undefined)
+    put_title(ax, subject(table), distrust(results), beneath, undefined)
     return ax
-
-
-def _of_surrogate(results: xr.Dataset) -> str:
-    """Return whose variance it is where indices are those of a surrogate that is not to be trusted."""
-    if "trusted" not in results or results["trusted"].ndim or int(results["trusted"]):
-        return ""
-    q2 = float(results["q2"]) if "q2" in results else np.nan
-    explains = f", which explains {max(q2, 0.0):.0%} of that of the outcome" if np.isfinite(q2) else ""
-    return f"of the variance of a surrogate not to be trusted{explains}"
 
 
 def _largest_first(indices: dict[str, xr.DataArray]) -> list[str]:

@@ -8,9 +8,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
+from matplotlib.scale import SymmetricalLogTransform
+from matplotlib.ticker import FixedLocator, NullLocator
 from numpy.typing import NDArray
 
-from hipuq.plots.captions import legend_below, level, over, put_title, say, selected, wrapped
+from hipuq.errors import check_name
+from hipuq.plots.captions import distrust, legend_below, level, over, put_title, say, selected, wrapped
 from hipuq.plots.style import BLACK, BLUE, BORDER, GREY, VERMILLION, axis_label, new_axes
 
 Array = NDArray[np.float64]
@@ -20,8 +23,19 @@ SPREAD = 0.2
 
 WAY_OUT = "results of the method 'chaos'"
 
+SCALES = ("auto", "linear", "symlog")
 
-def predicted_against_true(results: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+PILED = 0.2
+"""Share of the range below which the inner 80 % of the true values lie too close for a linear scale."""
+
+DECADES = 3
+"""Most decades on either side of 0 on a symmetric logarithmic scale."""
+
+MOST_LABELS = 9
+"""Labels of a symmetric logarithmic axis above which powers of ten are left out."""
+
+
+def predicted_against_true(results: xr.Dataset, *, ax: Axes | None = None, scale: str = "auto") -> Axes:
     """Draw the outcome of the surrogate over that of the model, for each held-out sample.
 
     Parameters
@@ -32,6 +46,9 @@ def predicted_against_true(results: xr.Dataset, *, ax: Axes | None = None) -> Ax
         ``limit_state`` of ``true`` and the share ``misclassified`` [1] with its limits.
     ax : Axes, optional
         Where to draw; a new figure by default.
+    scale : {"auto", "linear", "symlog"}
+        Of both axes; ``"symlog"`` is linear about 0 and logarithmic farther out. ``"auto"`` takes it where
+        the inner 80 % of the true values fill less than a fifth of their range and it draws them apart.
 
     Returns
     -------
@@ -46,7 +63,10 @@ def predicted_against_true(results: xr.Dataset, *, ax: Axes | None = None) -> Ax
     SchemaError
         If there are no such points, or they are over more than the samples, such as modes: then one
         has to be selected, as by ``results.sel(mode=18)``.
+    UnknownNameError
+        If there is no such scale.
     """
+    check_name("scale", scale, SCALES)
     true, predicted = (over(results, name, ("held_out",), WAY_OUT) for name in ("true", "predicted"))
     x, y = (part.values.astype(np.float64) for part in (true, predicted))
     known = np.isfinite(x) & np.isfinite(y)
@@ -58,7 +78,8 @@ def predicted_against_true(results: xr.Dataset, *, ax: Axes | None = None) -> Ax
         spread = ", spread sideways"
         x = x + SPREAD * ((np.arange(len(x)) * 0.6180339887) % 1 - 0.5)
     if known.any():
-        ends = _ends(np.concatenate([x[known], y[known], [] if limit is None else [limit]]))
+        stretch = _stretch(x[known], scale)
+        ends = _ends(np.concatenate([x[known], y[known], [] if limit is None else [limit]]), stretch)
         ax.plot(ends, ends, color=BLACK, linewidth=0.9, zorder=1.6, label="predicted = true")
         wrong = np.zeros_like(known) if limit is None else (x < limit) != (y < limit)
         right: dict[str, Any] = {"color": BLUE, "marker": "o", "facecolors": "none", "linewidths": 0.6}
@@ -72,13 +93,11 @@ def predicted_against_true(results: xr.Dataset, *, ax: Axes | None = None) -> Ax
             _points(ax, x, y, known & wrong, text, {"color": VERMILLION, "marker": "^", "linewidths": 0.0})
         if not known.all():
             ax.plot([], [], linestyle="none", label=f"unknown, not drawn: {(~known).sum()} of {known.size}")
-        ax.set_xlim(*ends)
-        ax.set_ylim(*ends)
+        _set_scales(ax, ends, stretch)
     else:
         say(ax, "no held-out sample is known")
         ax.set_xticks([])
         ax.set_yticks([])
-    ax.locator_params(nbins=6)
     ax.set_aspect("equal", adjustable="box")
     name = str(true.attrs.get("long_name", "value")).removesuffix(", true")
     for what, axis in (("true", ax.xaxis), ("predicted", ax.yaxis)):
@@ -116,11 +135,54 @@ def _is_verdict(true: xr.DataArray) -> bool:
     return known.size > 0 and bool(np.isin(known, (0.0, 1.0)).all())
 
 
-def _ends(values: Array) -> tuple[float, float]:
+def _stretch(true: Array, scale: str) -> SymmetricalLogTransform | None:
+    """Return the symmetric logarithmic scale for these values; None where it is to be the linear one."""
+    size = np.abs(true)
+    if scale == "linear" or size.max() == 0:
+        return None
+    # The linear part ends at a power of ten: below the smallest quarter, or decades below the largest.
+    least = max(float(np.quantile(size, 0.25)), 10.0**-DECADES * float(size.max()))
+    stretch = SymmetricalLogTransform(10.0, 10.0 ** np.floor(np.log10(least)), 1.0)
+    if scale == "symlog":
+        return stretch
+    plain = _inner_share(true)
+    return stretch if plain < PILED and plain < _inner_share(stretch.transform(true)) else None
+
+
+def _inner_share(values: Array) -> float:
+    """Return the share of the range that the inner 80 % of values fill."""
+    least, low, high, most = np.quantile(values, [0.0, 0.1, 0.9, 1.0])
+    return float((high - low) / (most - least)) if most > least else 1.0
+
+
+def _ends(values: Array, stretch: SymmetricalLogTransform | None) -> tuple[float, float]:
     """Return limits of both axes."""
+    if stretch is not None:
+        values = stretch.transform(values)
     least, most = float(values.min()), float(values.max())
     margin = 0.04 * (most - least) or 0.5 * abs(most) or 1.0
-    return least - margin, most + margin
+    ends = np.array([least - margin, most + margin])
+    low, high = ends if stretch is None else stretch.inverted().transform(ends)
+    return float(low), float(high)
+
+
+def _set_scales(ax: Axes, ends: tuple[float, float], stretch: SymmetricalLogTransform | None) -> None:
+    """Give both axes the same scale, limits and ticks."""
+    if stretch is None:
+        ax.set(xlim=ends, ylim=ends)
+        ax.locator_params(nbins=6)
+        return
+    ax.set_xscale("symlog", linthresh=stretch.linthresh, linscale=stretch.linscale)
+    ax.set_yscale("symlog", linthresh=stretch.linthresh, linscale=stretch.linscale)
+    ax.set(xlim=ends, ylim=ends)
+    count = np.floor(np.log10(np.abs(ends).max() / stretch.linthresh)) + 1
+    powers = stretch.linthresh * 10.0 ** np.arange(count)
+    ticks = np.array([0.0, *powers, *-powers])
+    step = 1 + int(((ticks >= ends[0]) & (ticks <= ends[1])).sum()) // MOST_LABELS
+    ticks = np.array([0.0, *powers[::-step], *-powers[::-step]])
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(FixedLocator(ticks.tolist()))
+        axis.set_minor_locator(NullLocator())
 
 
 def _points(
@@ -160,13 +222,11 @@ def _share(results: xr.Dataset, count: int, known: int) -> str:
 
 
 def _title(results: xr.Dataset, known: NDArray[np.bool_], where: str) -> list[str]:
-    """Return where the points are of, how good the surrogate is and whether it is to be trusted."""
-    lines = [where]
-    if "q2" in results and not results["q2"].ndim:
-        q2 = float(results["q2"])
-        value = "undefined" if np.isnan(q2) else f"{q2:.3f}"
-        lines.append(f"Q2 = {value} on {int(known.sum()):,} held-out samples")
-    if "trusted" in results and not results["trusted"].ndim and int(results["trusted"]) == 0:
-        why = str(results["trusted"].attrs.get("reasons", ""))
-        lines.append(f"not to be trusted{': ' if why else ''}{why}")
-    return lines
+    """Return where the points are of, and how good the surrogate is or that it is not to be trusted."""
+    count = f"{int(known.sum()):,}"
+    if warning := distrust(results):
+        return [where, f"{warning} ({count} held out)"]
+    if "q2" not in results or results["q2"].ndim:
+        return [where]
+    q2 = float(results["q2"])
+    return [where, f"Q2 {'undefined' if np.isnan(q2) else f'{q2:.3f}'} on {count} held-out samples"]

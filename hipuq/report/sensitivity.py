@@ -17,6 +17,12 @@ DECIMALS = 3
 PAIRS = 10
 """Pairs of parameters told, those with the largest second-order indices."""
 
+WIDE = 0.3
+"""Width of the interval of a total-order index above which it says nothing in words."""
+
+RIVALS = 3
+"""Parameters named that cannot be told from the first."""
+
 SMALL = 0.005
 """A share of the variance below this is none in words."""
 
@@ -49,7 +55,7 @@ def headline(results: xr.Dataset) -> str:
 
 
 def in_words(results: xr.Dataset) -> str:
-    """Return in one line which parameter explains most of the variance.
+    """Return in one line which parameter explains most of the variance, as far as limits tell.
 
     Parameters
     ----------
@@ -60,18 +66,47 @@ def in_words(results: xr.Dataset) -> str:
     -------
     str
         Empty where all indices are undefined, or those of a surrogate that is not to be trusted: its
-        variance is not that of the outcome.
+        variance is not that of the outcome. Where the interval of the largest total-order index is wider
+        than `WIDE` it says that instead; where others overlap it, they are named.
     """
     first, total = results["S1"], results["ST"]
     if total.ndim != 1 or bool((first.isnull() | total.isnull()).all()) or surrogate.distrust(results):
         return ""
     top = int(total.where(first.notnull()).argmax("parameter"))
-    name = parameter_label(str(total["parameter"].values[top]))
-    text = f"{sentence(outcome_of(total))}: {name} explains {_percent(first[top])} of the variance alone, "
-    text += f"{_percent(total[top])} with its interactions"
+    one = results.isel(parameter=top)
+    name = parameter_label(str(one["parameter"].item()))
+    text = f"{sentence(_subject(results))}: "
+    if "ST_low" in results and float(one["ST_high"] - one["ST_low"]) > WIDE:
+        ends = " and ".join(share(float(one[f"ST_{end}"]), 2) for end in ("low", "high"))
+        text += f"the indices are not resolved: the total-order index of {name} lies between {ends}; "
+        return text + "more samples are needed"
+    text += f"{name} explains {_percent(one, 'S1')} of the variance alone, "
+    text += f"{_percent(one, 'ST')} with its interactions{_rivals(results, top)}"
     if total.size > 1 and not bool(first.isnull().any()):
-        text += f"; the {total.size} parameters alone explain {_percent(first.sum())} together"
+        together = results[["S1"]].sum("parameter")
+        text += f"; the {total.size} parameters alone explain {_percent(together, 'S1')} together"
     return text
+
+
+def _rivals(results: xr.Dataset, top: int) -> str:
+    """Return which parameters may have a larger total-order index than that of `top`."""
+    if "ST_low" not in results:
+        return ""
+    overlap = (results["ST_high"] >= results["ST_low"][top]).values
+    overlap[top] = False
+    names = [parameter_label(str(name)) for name in results["parameter"].values[overlap]]
+    if not names:
+        return ""
+    told = names if len(names) <= RIVALS else [*names[: RIVALS - 1], f"{len(names) - RIVALS + 1} others"]
+    listed = " and ".join(filter(None, [", ".join(told[:-1]), told[-1]]))
+    are = "that" if len(names) == 1 else "those"
+    return f", which is not certain to be the most: the interval overlaps {are} of {listed}"
+
+
+def _subject(results: xr.Dataset) -> str:
+    """Return what indices are of."""
+    outcome = outcome_of(results["ST"])
+    return f"the surrogate of {outcome}" if surrogate.is_surrogate(results) else outcome
 
 
 def remarks(results: xr.Dataset) -> list[str]:
@@ -150,12 +185,20 @@ def _label(at: Mapping[Hashable, object], results: xr.Dataset, names: dict[str, 
     )
 
 
-def _percent(value: xr.DataArray) -> str:
-    return "none" if float(value) < SMALL else f"{100 * float(value):.0f} %"
+def _percent(results: xr.Dataset, name: str) -> str:
+    """Return a share of the variance with its limits, where it has some, such as ``42 % (39 to 45 %)``."""
+    value, *limits = (float(results[key]) for key in (name, f"{name}_low", f"{name}_high") if key in results)
+    text = "none" if value < SMALL else f"{share(100 * value, 0)} %"
+    if not limits or np.isnan(limits).any():
+        return text
+    low, high = (share(100 * end, 0) for end in limits)
+    return f"{text} ({low} to {high} %)"
 
 
 def _title(results: xr.Dataset, name: str) -> str:
-    return sentence(str(results[name].attrs.get("long_name", name)))
+    text = sentence(str(results[name].attrs.get("long_name", name)))
+    outcome = outcome_of(results[name])
+    return f"{text.removesuffix(outcome)}{_subject(results)}" if outcome else text
 
 
 def _heading(results: xr.Dataset, name: str) -> str:
@@ -169,7 +212,7 @@ def _by_parameter(results: xr.Dataset) -> Table:
         [str(one["parameter"].item()), *(with_limits(one, name, DECIMALS) for name in ("S1", "ST"))]
         for one in (results.isel(parameter=i) for i in np.argsort(-total, kind="stable"))
     ]
-    title = f"Sobol indices of {outcome_of(results['ST'])}: alone (S1) and with interactions (ST)"
+    title = f"Sobol indices of {_subject(results)}: alone (S1) and with interactions (ST)"
     return Table(title, ["parameter", *(_heading(results, name) for name in ("S1", "ST"))], rows)
 
 

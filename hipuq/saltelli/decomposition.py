@@ -33,15 +33,18 @@ def standardised(table: Array) -> Array:
     return (scaled - scaled.mean()) / spread if spread > 16 * EPS else np.zeros_like(scaled)
 
 
-def reason(table: Array, minimum_events: int | None) -> str:
+def reason(table: Array, minimum_events: int, verdict: bool) -> str:
     """Return why an outcome has no indices; empty if it has.
 
     Parameters
     ----------
     table : (blocks, width) array
         Columns A, AB by group, BA by group or none, B; NaN is unknown.
-    minimum_events : int or None
-        Of an outcome of 0 and 1: how many of each there must be in A and B; None for any other.
+    minimum_events : int
+        Of an outcome of 0 and 1 how many of each there must be in A and B, of any other how many that
+        differ from the commonest value.
+    verdict : bool
+        Whether it is one of 0 and 1.
 
     Returns
     -------
@@ -53,7 +56,9 @@ def reason(table: Array, minimum_events: int | None) -> str:
             f"{len(known)} of {len(table)} base points have no failed, unknown or missing sample: it takes 2"
         )
     both = known[:, [0, -1]]
-    if minimum_events is not None:
+    if standardised(known)[:, [0, -1]].var() <= EPS:
+        return f"the outcome does not vary: it is {both[0, 0]:.6g} in all samples of A and B"
+    if verdict:
         events = int((both == 1).sum())
         others = both.size - events
         if min(events, others) < minimum_events:
@@ -61,8 +66,15 @@ def reason(table: Array, minimum_events: int | None) -> str:
                 f"{events} events and {others} non-events among the samples of A and B, at least "
                 f'{minimum_events} of each are needed: take more samples, or analyse of="margin"'
             )
-    if standardised(known)[:, [0, -1]].var() <= EPS:
-        return f"the outcome does not vary: it is {both[0, 0]:.6g} in all samples of A and B"
+        return ""
+    values, counts = np.unique(both, return_counts=True)
+    others = both.size - int(counts.max())
+    # A small design may not hold as many samples that differ.
+    if others < min(minimum_events, both.size // 4):
+        return (
+            f"only {others} of {both.size} samples of A and B differ from {values[counts.argmax()]:.6g}, "
+            f"at least {minimum_events} are needed: take more samples"
+        )
     return ""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -31,6 +32,9 @@ MISCLASSIFIED_MOST = 0.05
 
 HELD_OUT_LEAST = 20
 """Known held-out samples that a check takes."""
+
+DIFFERENT_LEAST = 5
+"""Held-out samples that differ from the commonest value: with fewer the outcome is as good as constant."""
 
 UNKNOWN_MOST = 0.01
 """Share of the samples to fit that may be unknown."""
@@ -129,6 +133,11 @@ class Check:
             size //= 2
         return self.surrogate.everywhere(size, self.seed)
 
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Which levels have any weight, (levels,): what is unknown of the others does not count."""
+        return self.surrogate.expansion.weight > 0
+
     @cached_property
     def q2(self) -> Array:
         """Share of the variance explained on held-out samples, (outputs,); NaN where they do not vary."""
@@ -146,9 +155,8 @@ class Check:
         low, high = self._bounds()
         residuals = [part[self.held] - self.predicted for part in (self.y, low, high)]
         own = self.surrogate.expansion.mean_overall()
-        middle, below, above = (own + part for part in self.strata.mean(residuals, self.confidence))
-        if self.kind.bounded:
-            below, above = np.clip(below, 0.0, 1.0), np.clip(above, 0.0, 1.0)
+        found = [own + part for part in self.strata.mean(residuals, self.confidence)]
+        middle, below, above = (np.clip(part, 0.0, 1.0) if self.kind.bounded else part for part in found)
         return middle, below, above
 
     def _bounds(self) -> tuple[Array, Array]:
@@ -165,11 +173,12 @@ class Check:
     @cached_property
     def quantiles(self) -> Array:
         """Quantiles of the surrogate, (quantiles, outputs)."""
-        points, levels, outputs = self.everywhere.shape
-        weights = np.broadcast_to(self.surrogate.expansion.weight, (points, levels)).ravel()
+        values = self.everywhere[:, self.used]
+        points, levels, outputs = values.shape
+        weights = np.broadcast_to(self.surrogate.expansion.weight[self.used], (points, levels)).ravel()
         found = np.full((len(QUANTILES), outputs), np.nan)
         for k in range(outputs):
-            part = self.everywhere[:, :, k].ravel()
+            part = values[:, :, k].ravel()
             if not np.isnan(part).any():
                 found[:, k] = np.quantile(part, QUANTILES, weights=weights, method="inverted_cdf")
         return found
@@ -182,7 +191,7 @@ class Check:
         state = self.state
         distance = state.distance(self.everywhere)
         by_level = np.where(np.isnan(distance).any(axis=0), np.nan, (distance < 0).mean(axis=0))
-        overall = (self.surrogate.expansion.weight[:, None] * by_level).sum(axis=0)
+        overall = (self.surrogate.expansion.weight[:, None] * by_level)[self.used].sum(axis=0)
         true, said = state.event(self.true), state.event(self.predicted)
         wrong = np.where(np.isnan(true) | np.isnan(said), np.nan, (true != said).astype(np.float64))
         name = str(self.values.attrs.get("long_name", self.values.name))
@@ -201,7 +210,7 @@ class Check:
         assert self.state is not None
         rows = self.outcomes["round"].values > 0
         if rows.any():
-            strata = sample_strata(self.outcomes, rows, float(self.population))
+            strata = sample_strata(self.outcomes, rows, self._draws())
             return strata.share(self.state.event(self.y[rows]), self.confidence)
         true = self.state.event(self.true)
         plain = self.strata.share(true, self.confidence)
@@ -220,16 +229,25 @@ class Check:
         middle, low, high = np.array(columns).T
         return middle, low, high
 
+    def _draws(self) -> float:
+        """Return the number of points that the weights of the strata were found from."""
+        refine = json.loads(self.outcomes.attrs.get("options") or "{}").get("refine", {})
+        return float(refine.get("population", self.population))
+
     def undefined(self, output: int) -> str:
         """Return why indices of an output are undefined, empty where they are not."""
-        variance = self.surrogate.expansion.variance_overall()[output]
-        if np.isnan(variance):
-            return "no sample of some level has a known outcome"
-        if variance > 0:
-            return ""
-        if np.nanmax(self.surrogate.spread[:, output]) > 0:
+        expansion = self.surrogate.expansion
+        if np.isnan(expansion.mean_overall()[output]):
+            where = " of some level" if self.surrogate.discrete else ""
+            return f"too few samples{where} have a known outcome"
+        fitted = self.y[self.outcomes["stratum"].values < 0, output]
+        if np.nanmax(fitted) == np.nanmin(fitted):
+            return "the outcome does not vary in the samples"
+        no_better = self.q2[output] <= 0 or self.surrogate.loo_overall[output] >= 1
+        # Means of levels differ by chance too: without a polynomial that is no cause.
+        if no_better or not expansion.variance_overall()[output] > 0:
             return "no polynomial predicts the outcome better than its mean; more samples may help"
-        return "the outcome does not vary in the samples"
+        return ""
 
     @cached_property
     def reasons(self) -> list[list[str]]:
@@ -256,12 +274,19 @@ class Check:
             reasons.append(
                 f"the surrogate explains {q2:.0%} of the variance of held-out samples, below {Q2_LEAST:.0%}"
             )
+        true = self.true[~np.isnan(self.true[:, k]), k]
+        same = int(np.unique(true, return_counts=True)[1].max(initial=0))
+        if known >= HELD_OUT_LEAST and known - same < DIFFERENT_LEAST:
+            reasons.append(
+                f"only {known - same} of {known} held-out samples differ from the commonest value, "
+                "so neither the fit nor the limits of the mean can be judged"
+            )
         if self.events is not None:
             wrong = self.events.misclassified[0][k]
             if wrong > MISCLASSIFIED_MOST:
                 reasons.append(f"{wrong:.1%} of the held-out samples are misclassified")
             alone, (_, low, high) = self.events.overall[k], (part[k] for part in self.events.corrected)
-            if not low <= alone <= high:
+            if alone < low or alone > high:
                 interval = f"{low:.4f} to {high:.4f}"
                 reasons.append(f"its own probability {alone:.4f} lies outside the corrected {interval}")
         return reasons

@@ -19,15 +19,13 @@ from hipuq import schema
 from hipuq.errors import InputError
 from hipuq.estimation.results import kind_of
 from hipuq.intervals import combined, student, wilson
+from hipuq.surrogates.options import check_limit
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-STRATA = 8
-"""Strata of the correction, of equal probability, by prediction."""
-
-LEAST = 16
-"""Fewest true evaluations in a stratum: with less the interval of one stratum alone would be wide."""
+ROUNDING = 1e-9
+"""Weights that add up to 1 but for this leave nothing out."""
 
 LIMIT = "limit_state"
 """Attribute of an outcome: the event is that it lies below this value."""
@@ -82,8 +80,7 @@ def limit_state_of(values: xr.DataArray, limit: float | None) -> LimitState | No
         raise InputError(
             f"limit is {limit!r}, but {values.name} is a verdict: its event is 1, leave limit out"
         )
-    if isinstance(limit, bool) or not isinstance(limit, (int, float)) or not np.isfinite(limit):
-        raise InputError(f"limit is {limit!r}: it must be a finite number in the unit of {values.name}")
+    check_limit(limit)
     return LimitState(float(limit))
 
 
@@ -115,19 +112,21 @@ class Strata:
             limit = wilson(np.nan_to_num(filled) * draws, draws, confidence)[end]
             ends.append((limit, np.where(draws > 0, filled, value)))
         (low, floor), (high, ceiling) = ends
-        variance = np.clip(floor, 0.5, ceiling) if np.isnan(estimate).any() else estimate
-        whole = (self.weight[:, None] * variance).sum(axis=0)
+        # The largest variance that the unknown leaves.
+        whole = (self.weight[:, None] * np.clip(0.5, floor, ceiling)).sum(axis=0)
         spread = ndtri(0.5 + confidence / 2) * np.sqrt(whole * (1 - whole) / self.draws)
-        middle, below, above = self._combined(estimate, low, high, floor, ceiling, spread=spread)
+        columns = {"estimate": estimate, "low": low, "high": high, "floor": floor, "ceiling": ceiling}
+        middle, below, above = self._combined(columns | {"draws": draws}, spread, confidence)
         return middle, np.clip(below, 0.0, 1.0), np.clip(above, 0.0, 1.0)
 
     def mean(self, values: list[Array], confidence: float) -> tuple[Array, Array, Array]:
         """Return a mean with its t limits from the values, and the lower and upper bounds of each."""
         known, low, high = values
-        estimate = self._moments(known)[0]
-        floor, ceiling = (self._moments(part)[0] for part in (low, high))
-        ends = [student(*self._moments(part), confidence)[i] for i, part in enumerate((low, high))]
-        return self._combined(estimate, *ends, floor, ceiling)
+        columns = {"estimate": self._moments(known)[0]}
+        for end, (limit, start, part) in enumerate((("low", "floor", low), ("high", "ceiling", high))):
+            moments = self._moments(part)
+            columns |= {limit: student(*moments, confidence)[end], start: moments[0]}
+        return self._combined(columns)
 
     def _moments(self, values: Array) -> tuple[Array, Array, Array]:
         """Return mean, sum of squared deviations and number of the known values by stratum."""
@@ -141,69 +140,27 @@ class Strata:
             squares[k] = np.nansum(np.square(part - mean[k]), axis=0)
         return mean, squares, known
 
-    def _combined(self, *columns: Array, spread: Array | float = 0.0) -> tuple[Array, Array, Array]:
-        names = ("estimate", "low", "high", "floor", "ceiling")
-        table = xr.Dataset(
-            {name: (("stratum", "output"), part) for name, part in zip(names, columns, strict=True)}
-        ).assign(weight=("stratum", self.weight))
-        extra = xr.DataArray(np.broadcast_to(spread, columns[0].shape[1:]), dims="output")
-        middle, low, high = (part.values for part in combined(table, "weight", "stratum", extra))
+    def _combined(
+        self, columns: dict[str, Array], spread: Array | float = 0.0, confidence: float | None = None
+    ) -> tuple[Array, Array, Array]:
+        table = xr.Dataset({name: (("stratum", "output"), part) for name, part in columns.items()})
+        extra = xr.DataArray(np.broadcast_to(spread, columns["estimate"].shape[1:]), dims="output")
+        found = combined(
+            table.assign(weight=("stratum", self.weight)), "weight", "stratum", extra, confidence
+        )
+        middle, low, high = (part.values for part in found)
         return middle, low, high
 
 
-def strata_of(
-    distance: Array, held: Array, event: Array, wanted: int
-) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
-    """Return the stratum of each point and how many true evaluations each stratum should get.
-
-    Half of them go to all strata alike, for the interval must not rest on trust in the surrogate; the
-    other half where the events of the held-out samples are most mixed (Neyman's allocation).
-
-    Parameters
-    ----------
-    distance : (points,) array
-        Predicted distance to the limit state.
-    held : (h,) array
-        The same of held-out samples.
-    event : (h,) array
-        Whether they are events; NaN where unknown.
-    wanted : int
-        True evaluations.
-
-    Returns
-    -------
-    stratum : (points,) array of int
-        From 0.
-    count : (strata,) array of int
-        Adds up to `wanted`.
-
-    Raises
-    ------
-    InputError
-        If so few are wanted that no stratum gets enough.
-    """
-    if wanted < STRATA * LEAST:
-        raise InputError(f"correction is {wanted}: it takes {STRATA * LEAST} true evaluations or more, or 0")
-    edges = np.quantile(distance, np.arange(1, STRATA) / STRATA)
-    stratum = np.searchsorted(edges, distance, side="right")
-    known = ~np.isnan(event)
-    where = np.searchsorted(edges, held[known], side="right")
-    hits = np.bincount(where, event[known], STRATA) + 0.5
-    n = np.bincount(where, minlength=STRATA) + 1.0
-    size = np.bincount(stratum, minlength=STRATA)
-    spread = size * np.sqrt(hits / n * (1 - hits / n))
-    share = 0.5 * size / size.sum() + 0.5 * spread / spread.sum()
-    exact = share * wanted
-    count = np.floor(exact).astype(np.int64)
-    count[np.argsort(count - exact)[: wanted - int(count.sum())]] += 1
-    return stratum, np.minimum(count, size)
-
-
 def sample_strata(outcomes: xr.Dataset, rows: Mask, draws: float = np.inf) -> Strata:
-    """Return the strata that samples carry in their coordinates ``stratum`` and ``stratum_weight``."""
-    if not rows.any():
-        return Strata(np.empty(0, np.intp), np.ones(1))
+    """Return the strata that samples carry in their coordinates ``stratum`` and ``stratum_weight``.
+
+    What they leave of the whole is one more stratum, in which nothing is known.
+    """
     names, place = np.unique(outcomes["stratum"].values[rows], return_inverse=True)
     weight = outcomes["stratum_weight"].values[rows]
-    first = np.array([weight[place == i][0] for i in range(len(names))])
-    return Strata(place.astype(np.intp), first / first.sum(), draws)
+    first = [float(weight[place == i][0]) for i in range(len(names))]
+    rest = 1.0 - sum(first)
+    if rest > ROUNDING:
+        first.append(rest)
+    return Strata(place.astype(np.intp), np.array(first) / sum(first), draws)

@@ -43,11 +43,11 @@ def summarised(surrogate: Surrogate, check: Check, inputs: Inputs, groups: bool)
     units = str(check.values.attrs.get("units", ""))
     square = units if units in ("", "1") else f"({units})^2"
     by_level: dict[str, tuple[NDArray[Any], Array | None, str, str]] = {
-        "mean": (expansion.mean(), expansion.mean_overall(), f"mean of {name}", units),
+        "mean": (expansion.mean(), expansion.mean_overall(), f"mean of {name}, surrogate alone", units),
         "variance": (
             np.where(np.isnan(expansion.mean()), np.nan, expansion.variance()),
             expansion.variance_overall(),
-            f"variance of {name}",
+            f"variance of {name}, surrogate alone",
             square,
         ),
         "loo": (surrogate.loo, surrogate.loo_overall, "relative corrected leave-one-out error", "1"),
@@ -60,9 +60,10 @@ def summarised(surrogate: Surrogate, check: Check, inputs: Inputs, groups: bool)
         if overall is not None and surrogate.discrete:
             table.put(f"{key}_overall", overall, f"{text}, over all levels", unit)
     table.put("q2", check.q2, "share of the variance explained on held-out samples (Q2)", "1")
-    table.put_limits(
-        "mean_corrected", check.mean, f"mean of {name}, surrogate mended by held-out samples", units
-    )
+    if check.kind.graded or not check.kind.bounded:
+        # Of a verdict the corrected probability is the better one.
+        text = f"mean of {name}, surrogate mended by held-out samples"
+        table.put_limits("mean_corrected", check.mean, text, units)
     attrs = schema.COORDINATES["quantile"].attrs
     table.results = table.results.assign_coords(quantile=("quantile", np.array(check.levels), attrs))
     table.put("quantiles", check.quantiles, f"quantile of {name}, surrogate", units, "quantile")
@@ -173,6 +174,10 @@ def _indices(surrogate: Surrogate, check: Check, inputs: Inputs, groups: bool) -
     placed = {}
     for key, array in zip(("S1", "ST", "S2"), found_indices, strict=True):
         part = array[order][:, order] if key == "S2" else array[order]
+        part = np.where([bool(why) for why in whys], np.nan, part)
         placed[key] = part.reshape((*part.shape[:-1], *check.values.shape[1:]))
     reason = indices.undefined(whys, check.values)
-    return indices.labelled(placed, names, check.values, dict.fromkeys(placed, reason))
+    made = indices.labelled(placed, names, check.values, dict.fromkeys(placed, reason))
+    for key in placed:
+        made[key].attrs["long_name"] += ", surrogate alone"
+    return made

@@ -9,20 +9,18 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from hipuq.errors import InputError, SchemaError, check_name
+from hipuq.errors import InputError, SchemaError
 from hipuq.expansion.basis import MOST_TERMS, count, leading, multi_indices, tensor
 from hipuq.expansion.expansion import Expansion
 from hipuq.expansion.fitting import Fit, least_squares, project, sparse
 from hipuq.expansion.germs import Germs
 from hipuq.inputs import Inputs
-from hipuq.sampling import check_count, unit_points
+from hipuq.sampling import unit_points
+from hipuq.surrogates.options import QUADRATURE, Basis, discrete_of
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 Mask = NDArray[np.bool_]
-
-FITS = ("least_squares", "sparse", "quadrature")
-"""Ways to find the coefficients."""
 
 HIGHEST = 15
 """Highest degree that is tried where none is asked for."""
@@ -30,7 +28,7 @@ HIGHEST = 15
 PER_TERM = 1.5
 """Samples for each term of the largest basis that is tried by least squares where no degree is asked for."""
 
-SPARSE_TERMS = 8
+SPARSE_TERMS = 4
 """Terms for each sample of the largest basis that is tried by sparse regression, likewise."""
 
 VALUES_MAXIMUM = 2**25
@@ -38,37 +36,6 @@ VALUES_MAXIMUM = 2**25
 
 FIRST_KEY = 2**31
 """Key of the random streams of estimates; those below it belong to designs."""
-
-
-@dataclass(frozen=True)
-class Basis:
-    """What a fit may use.
-
-    Attributes
-    ----------
-    fit : str
-        One of `FITS`.
-    degree : int or None
-        The degree; None chooses it by the leave-one-out error.
-    q : float
-        Norm of the truncation: 1 keeps all terms up to the degree in all, less keeps fewer interactions.
-    interaction : int or None
-        Most inputs that may occur in a term.
-    """
-
-    fit: str = "least_squares"
-    degree: int | None = None
-    q: float = 1.0
-    interaction: int | None = None
-
-    def __post_init__(self) -> None:
-        check_name("fit", self.fit, FITS)
-        if self.degree is not None:
-            check_count("degree", self.degree, 0)
-        if self.interaction is not None:
-            check_count("interaction", self.interaction)
-        if isinstance(self.q, bool) or not isinstance(self.q, (int, float)) or not 0 < self.q <= 1:
-            raise InputError(f"q is {self.q!r}: the norm of the truncation lies above 0 and is at most 1")
 
 
 @dataclass(frozen=True)
@@ -103,13 +70,12 @@ class Surrogate:
         """Corrected leave-one-out error over all levels, relative to the variance over all, (outputs,)."""
         # Where a level does not vary there is no error.
         error = np.where(self.spread == 0, 0.0, self.loo * self.spread)
-        weight = self.expansion.weight[:, None]
-        between = (weight * np.square(self.expansion.mean() - self.expansion.mean_overall())).sum(axis=0)
-        whole = (weight * self.spread).sum(axis=0) + between
-        found: Array = np.divide(
-            (weight * error).sum(axis=0), whole, out=np.full_like(whole, np.nan), where=whole > 0
-        )
-        return found
+        used = self.expansion.weight > 0
+        weight = self.expansion.weight[used, None]
+        between = np.square(self.expansion.mean() - self.expansion.mean_overall())[used]
+        whole = (weight * (self.spread[used] + between)).sum(axis=0)
+        total = (weight * error[used]).sum(axis=0)
+        return np.asarray(np.divide(total, whole, out=np.full_like(whole, np.nan), where=whole > 0))
 
     def at(self, samples: xr.Dataset, inputs: Inputs) -> Array:
         """Return the predictions at samples of all inputs, (s, outputs)."""
@@ -137,24 +103,6 @@ class Surrogate:
             germs = self.expansion.germs.values(self.inputs.samples(u))
             made[rows] = self.expansion.at_all_levels(germs)
         return made
-
-
-def discrete_of(inputs: Inputs) -> tuple[str, Inputs]:
-    """Return the name of the discrete input, empty without one, and the continuous inputs.
-
-    Raises
-    ------
-    InputError
-        If no input is continuous.
-    """
-    name = inputs.discrete[0] if inputs.discrete else ""
-    rest = inputs.without(name) if name else inputs
-    if not rest.dimension:
-        raise InputError(
-            f"polynomial chaos needs a continuous input, there is only {name!r}: its levels can all be "
-            f"evaluated, method 'monte_carlo' with n=1, stratify={name!r}"
-        )
-    return name, rest
 
 
 def places(samples: xr.Dataset, inputs: Inputs) -> Places:
@@ -235,7 +183,8 @@ def fitted(
         for columns, known in _alike(~np.isnan(values[own])):
             rows = own[known]
             used[level, columns] = len(rows)
-            if not len(rows):
+            # What is unknown may leave a level too little, and does not stop the others.
+            if len(rows) < len(own) and len(rows) <= (1 if basis.degree is None else len(indices)):
                 continue
             psi = tensor(germs.univariate(points[rows], int(indices.max(initial=0))), indices)
             spread[level, columns] = values[np.ix_(rows, columns)].var(axis=0)
@@ -251,6 +200,27 @@ def fitted(
     kept[0] = True
     expansion = Expansion(germs, indices[kept], coefficients[:, kept], weight)
     return Surrogate(expansion, rest, name, loo, spread, degree, terms, used)
+
+
+def basis_of(
+    outcomes: xr.Dataset, fit: str | None, degree: int | None, q: float, interaction: int | None
+) -> tuple[Basis, Array | None]:
+    """Return what the fit may use, and the quadrature weights (s,) where it takes them.
+
+    Raises
+    ------
+    SchemaError
+        If quadrature is asked for and the outcomes are not those of nodes.
+    """
+    nodes = outcomes.coords.get("quadrature_weight")
+    if fit is None:
+        fit = "least_squares" if nodes is None else QUADRATURE
+    basis = Basis(fit, degree, q, interaction)
+    if fit != QUADRATURE:
+        return basis, None
+    if nodes is None:
+        raise SchemaError("fit 'quadrature' needs quadrature nodes: design with sampler='quadrature'")
+    return basis, nodes.values.astype(np.float64)
 
 
 def _indices(germs: Germs, basis: Basis, points: Array, samples: int) -> NDArray[np.int64]:

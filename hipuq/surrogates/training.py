@@ -9,17 +9,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from hipuq import schema
-from hipuq.errors import InputError, check_name
+from hipuq.errors import SchemaError, check_name
 from hipuq.estimation.results import levels_of
 from hipuq.expansion.germs import Germs
 from hipuq.inputs import Inputs
 from hipuq.sampling import SAMPLERS, check_count, check_size, rows_of, samples_by_block, spawn, unit_points
-from hipuq.surrogates.surrogate import FIRST_KEY, discrete_of
+from hipuq.surrogates.options import QUADRATURE, check_share, discrete_of
+from hipuq.surrogates.surrogate import FIRST_KEY
 
 Array = NDArray[np.float64]
-
-QUADRATURE = "quadrature"
-"""Sampler that takes the nodes of a tensor Gauss rule."""
 
 FIT, HELD_OUT = -1, 0
 """Values of the coordinate ``stratum``: to fit, and held out; from 1 strata of the correction."""
@@ -58,12 +56,6 @@ def plan(inputs: Inputs, n: int, sampler: str, held_out: float) -> tuple[int, in
         table = inputs.levels(name)
         levels = table.sizes[table.attrs["dim"]]
     return share, levels, math.ceil(held_out * share * levels)
-
-
-def check_share(held_out: float) -> None:
-    """Raise an InputError unless `held_out` is a number from 0."""
-    if isinstance(held_out, bool) or not isinstance(held_out, (int, float)) or not 0 <= held_out < np.inf:
-        raise InputError(f"held_out is {held_out!r}: it is a share of the samples to fit, 0 or more")
 
 
 def drawn(inputs: Inputs, n: int, seed: int, rows: slice | None, sampler: str, held_out: float) -> xr.Dataset:
@@ -118,6 +110,30 @@ def drawn(inputs: Inputs, n: int, seed: int, rows: slice | None, sampler: str, h
             "stratum_weight": np.where(fit, 0.0, 1.0),
         },
     )
+
+
+def with_books(outcomes: xr.Dataset, inputs: Inputs, held_out: float, seed: int) -> xr.Dataset:
+    """Return outcomes that say which samples are to fit and which are held out.
+
+    Raises
+    ------
+    SchemaError
+        If they say so in part, or leave nothing to fit.
+    """
+    names = [name for name in ("round", "stratum", "stratum_weight") if name in outcomes.coords]
+    if "stratum" not in names:
+        return divided(outcomes, inputs, held_out, seed)
+    if len(names) < 3:
+        raise SchemaError(
+            f"the outcomes have of the coords round, stratum and stratum_weight only {', '.join(names)}: "
+            "keep all of them, or drop 'stratum' to divide the samples anew"
+        )
+    if not (outcomes["stratum"].values == FIT).any():
+        raise SchemaError(
+            "all samples of the outcomes are held out, none is left to fit: "
+            "drop the coord 'stratum' to divide them anew"
+        )
+    return outcomes
 
 
 def divided(outcomes: xr.Dataset, inputs: Inputs, held_out: float, seed: int) -> xr.Dataset:
