@@ -223,7 +223,8 @@ def _share(results: xr.Dataset, count: int, known: int) -> str:
 
 def _title(results: xr.Dataset, known: NDArray[np.bool_], where: str) -> list[str]:
     """Return where the points are of, and how good the surrogate is or that it is not to be trusted."""
-    count = f"{int(known.sum()):,}"
+    # Of very many held-out samples not all are kept to be drawn.
+    count = f"{int(results['checked']) if 'checked' in results else int(known.sum()):,}"
     if warning := distrust(results):
         return [where, f"{warning} ({count} held out)"]
     if "q2" not in results or results["q2"].ndim:

@@ -59,6 +59,8 @@ def summarised(surrogate: Surrogate, check: Check, inputs: Inputs, groups: bool)
         table.put(key, values, text, unit, by_level=True)
         if overall is not None and surrogate.discrete:
             table.put(f"{key}_overall", overall, f"{text}, over all levels", unit)
+    checked = (~np.isnan(check.true)).sum(axis=0)
+    table.put("checked", checked, "held-out samples with a known outcome", "1")
     table.put("q2", check.q2, "share of the variance explained on held-out samples (Q2)", "1")
     if check.kind.graded or not check.kind.bounded:
         # Of a verdict the corrected probability is the better one.
@@ -179,5 +181,5 @@ def _indices(surrogate: Surrogate, check: Check, inputs: Inputs, groups: bool) -
     reason = indices.undefined(whys, check.values)
     made = indices.labelled(placed, names, check.values, dict.fromkeys(placed, reason))
     for key in placed:
-        made[key].attrs["long_name"] += ", surrogate alone"
+        made[key].attrs["long_name"] = f"surrogate's {made[key].attrs['long_name']}"
     return made
