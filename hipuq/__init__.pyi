@@ -1,6 +1,7 @@
 from . import cea as cea
 from . import models as models
 from . import plots as plots
+from .comparison import compare as compare
 from .contact import ContactPatterns as ContactPatterns
 from .driver import design as design
 from .driver import estimate as estimate

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import AbstractContextManager
 from typing import Any
 
 import xarray as xr
@@ -85,7 +86,7 @@ def estimate(
     _check_of(of)
     record = method_named(method)
     record.check("estimate", options)
-    return record.estimate(outcomes, inputs, of=of, rng=rng, **options)
+    return estimated(record, outcomes, inputs, of=of, rng=rng, **options)
 
 
 def run(
@@ -144,7 +145,7 @@ def run(
         executor=executor,
         progress=progress,
     )
-    return record.estimate(outcomes, inputs, of=of, **stages["estimate"])
+    return estimated(record, outcomes, inputs, of=of, **stages["estimate"])
 
 
 def completed(
@@ -191,12 +192,40 @@ def completed(
     outcomes = evaluated(record.design(inputs, n, seed, **stages["design"]))
     number = 1
     while record.refine is not None:
-        more = record.refine(outcomes, inputs, spawn(seed, number), of=of[0], **stages["refine"])
+        with one_thread():
+            more = record.refine(outcomes, inputs, spawn(seed, number), of=of[0], **stages["refine"])
         if more is None:
             break
         outcomes = together(outcomes, evaluated(more))
         number += 1
     return outcomes
+
+
+def estimated(record: Method, outcomes: xr.Dataset, inputs: Inputs, **options: Any) -> xr.Dataset:
+    """Return what a method estimates, the same to the last bit whatever number of threads BLAS would take.
+
+    Parameters
+    ----------
+    record : Method
+    outcomes : Dataset
+    inputs : Inputs
+    **options
+        Of the method's estimate, `of` among them.
+
+    Returns
+    -------
+    Dataset
+    """
+    with one_thread():
+        return record.estimate(outcomes, inputs, **options)
+
+
+def one_thread() -> AbstractContextManager[Any]:
+    """Return a context in which BLAS takes one thread: its matrices are small here, more would wait."""
+    from threadpoolctl import threadpool_limits
+
+    limits: AbstractContextManager[Any] = threadpool_limits(1, "blas")
+    return limits
 
 
 def with_bounds(of: Iterable[str], model: Callable[..., xr.Dataset]) -> list[str]:

@@ -17,7 +17,7 @@ import xarray as xr
 
 from hipuq import __version__, schema
 from hipuq.contact import ContactPatterns
-from hipuq.driver import completed, method_named
+from hipuq.driver import completed, estimated, method_named
 from hipuq.errors import HipuqError, InputError, StoreError, StudyError, check_name
 from hipuq.evaluation import evaluate
 from hipuq.friction import FrictionIntegrated, integrate_friction
@@ -194,8 +194,8 @@ def run_study(
         )
         save_outcomes(outcomes, folder / "outcomes" / f"{analysis.name}.zarr")
         found = {
-            f"{analysis.name}/{of}": method.estimate(
-                outcomes, analysis.inputs, of=of, **analysis.options["estimate"]
+            f"{analysis.name}/{of}": estimated(
+                method, outcomes, analysis.inputs, of=of, **analysis.options["estimate"]
             )
             for of in analysis.of
         }

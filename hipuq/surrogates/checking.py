@@ -224,10 +224,21 @@ class Check:
             if np.isnan(p) or min(counts) == 0:
                 columns.append([part[k] for part in plain])
                 continue
-            both = Strata(place.astype(np.intp), np.array([1 - p, p]), float(len(self.everywhere)))
+            both = Strata(place.astype(np.intp), np.array([1 - p, p]), self._independent(k, p))
             columns.append([part[0] for part in both.share(true[:, k : k + 1], self.confidence)])
         middle, low, high = np.array(columns).T
         return middle, low, high
+
+    def _independent(self, k: int, p: float) -> float:
+        """Return the number of independent draws that tell the surrogate's own share p as well as its points.
+
+        A point is one draw of the continuous inputs for all levels together.
+        """
+        assert self.state is not None
+        event = self.state.distance(self.everywhere[:, self.used, k]) < 0
+        by_point = event @ self.surrogate.expansion.weight[self.used]
+        variance = float(by_point.var()) / len(by_point)
+        return p * (1 - p) / variance if variance > 0 else np.inf
 
     def _draws(self) -> float:
         """Return the number of points that the weights of the strata were found from."""

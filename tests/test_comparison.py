@@ -1,0 +1,156 @@
+"""Methods compared on a problem with a known answer: errors, coverage, seeds, budgets."""
+
+import chaospy as cp
+import numpy as np
+import pytest
+import xarray as xr
+from functions import ishigami
+
+import hipuq
+from hipuq import compare
+
+INPUTS = hipuq.Inputs(a=cp.Uniform(0.0, 1.0), b=cp.Uniform(0.0, 1.0))
+
+CONTENDERS = {
+    "random": {"method": "monte_carlo"},
+    "latin hypercube": {"method": "monte_carlo", "sampler": "latin_hypercube"},
+    "Sobol points": {"method": "monte_carlo", "sampler": "sobol"},
+    "chaos": {"method": "chaos", "degree": 2},
+}
+
+
+def smooth(samples: xr.Dataset) -> xr.Dataset:
+    """Return a smooth function of mean 1/3 + 1/4."""
+    return xr.Dataset({"y": samples["a"] ** 2 + samples["a"] * samples["b"]})
+
+
+@pytest.fixture(scope="module")
+def race() -> xr.Dataset:
+    return compare(
+        smooth, INPUTS, CONTENDERS, of="y", reference=7 / 12, budgets=[64, 256, 1024], replicates=24, rng=1
+    )
+
+
+def test_errors_fall_as_they_should(race):
+    """Monte Carlo as n**-1/2; a latin hypercube and Sobol points of a smooth function faster."""
+    slope = {
+        name: np.polyfit(
+            np.log(race["evaluations"].loc[{"method": name}]), np.log(race["rmse"].loc[{"method": name}]), 1
+        )[0]
+        for name in CONTENDERS
+        if name != "chaos"
+    }
+    assert slope["random"] == pytest.approx(-0.5, abs=0.15)
+    # Owen scrambled points of a smooth function: n**-3/2, up to logarithms.
+    assert slope["Sobol points"] == pytest.approx(-1.5, abs=0.4)
+    exact = float(race["rmse"].loc[{"method": "random", "budget": 256}])
+    # variance 4/45 + 2 * 1/24 + 7/144 of y over 256 samples
+    assert exact == pytest.approx(np.sqrt((4 / 45 + 1 / 12 + 7 / 144) / 256), rel=0.4)
+    assert float(race["rmse"].loc[{"method": "chaos"}].max()) < 1e-9
+    assert (race["rmse_low"] <= race["rmse"]).all() and (race["rmse"] <= race["rmse_high"]).all()
+
+
+def test_intervals_hold_the_answer_as_often_as_they_say(race):
+    held = race["coverage"].loc[{"method": "random"}]
+    assert (held >= 0.8).all()
+    assert (race["coverage_low"] <= race["coverage"]).all()
+    assert race["low"].shape == (4, 3, 24)
+
+
+def test_budgets_are_kept_and_used(race):
+    found = race["evaluations"]
+    assert (found <= race["budget"]).all()
+    assert found.loc[{"method": "random"}].values.tolist() == [64, 256, 1024]
+    assert (found > 0.8 * race["budget"]).all()
+
+
+def test_seeds_belong_to_the_contender(race):
+    two = {"chaos": CONTENDERS["chaos"], "random": CONTENDERS["random"]}
+    alone = compare(smooth, INPUTS, two, of="y", reference=7 / 12, budgets=[64], replicates=3, rng=1)
+    here = race["estimate"].loc[{"method": "random", "budget": 64}][:3]
+    assert alone["estimate"].loc[{"method": "random", "budget": 64}].equals(here)
+    estimate = race["estimate"].loc[{"method": "random"}].values.ravel()
+    assert len(np.unique(estimate)) == estimate.size
+
+
+def test_indices_too_can_be_compared():
+    known = ishigami()
+    contenders = {
+        "sobol": {"method": "sobol", "resamples": 100},
+        "chaos": {"method": "chaos", "fit": "sparse"},
+    }
+    race = compare(
+        known.model,
+        known.inputs,
+        contenders,
+        of="y",
+        quantity="ST",
+        reference=known.total,
+        budgets=[320, 1280],
+        replicates=4,
+        rng=0,
+    )
+    assert race["rmse"].dims == ("method", "budget", "parameter")
+    assert race["evaluations"].loc[{"method": "sobol"}].values.tolist() == [320, 1280]
+    last = race["rmse"].sel(budget=1280)
+    assert (last.loc[{"method": "chaos"}] < last.loc[{"method": "sobol"}]).all()
+    assert np.isnan(race["coverage"].loc[{"method": "chaos"}]).all()
+
+
+def test_friction_integrated_takes_part():
+    model = hipuq.models.two_dof("hoffmann2002")
+    exact = hipuq.integrate_friction(model, cp.Uniform(0.0, 0.8))
+    scatter = {"k3": hipuq.relative(cp.Uniform(-0.1, 0.1))}
+    contenders = {
+        "sampled": {"method": "monte_carlo"},
+        "integrated": {
+            "method": "monte_carlo",
+            "model": exact,
+            "inputs": exact.inputs(**scatter),
+            "of": "probability",
+        },
+    }
+    inputs = model.inputs(friction=cp.Uniform(0.0, 0.8), **scatter)
+    reference = hipuq.run(
+        exact, exact.inputs(**scatter), method="chaos", n=12, sampler="quadrature", of="probability"
+    )
+    race = compare(
+        model,
+        inputs,
+        contenders,
+        of="any_unstable",
+        reference=float(reference["mean"]),
+        budgets=[32],
+        replicates=5,
+        rng=2,
+    )
+    error = race["rmse"].sel(budget=32)
+    assert float(error.loc[{"method": "integrated"}]) < float(error.loc[{"method": "sampled"}])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"budgets": [64, 32]}, "they must rise"),
+        ({"budgets": [2], "contenders": {"s": {"method": "sobol"}}}, "within a budget of 2"),
+        ({"contenders": {}}, "no contenders"),
+        ({"contenders": {"a": {}}}, "names no method"),
+        ({"contenders": {"a": {"method": "monte"}}}, "did you mean 'monte_carlo'"),
+        ({"contenders": {"a": {"method": "monte_carlo", "degree": 2}}}, "unknown option"),
+        ({"reference": np.nan}, "must be finite"),
+        ({"reference": [1.0, 2.0]}, "the reference has"),
+        ({"quantity": "S1"}, "have no S1_overall or S1"),
+        ({"replicates": 1}, "replicates is 1"),
+    ],
+)
+def test_what_cannot_be_compared(changes, message):
+    given = {
+        "contenders": CONTENDERS,
+        "of": "y",
+        "reference": 0.5,
+        "budgets": [64],
+        "replicates": 2,
+        **changes,
+    }
+    with pytest.raises(hipuq.HipuqError, match=message):
+        compare(smooth, INPUTS, given.pop("contenders"), rng=0, **given)
