@@ -67,6 +67,7 @@ class Contender:
         for n in sizes:
             count = self._evaluations(n)
             if count is not None and count <= budget:
+                self.record.plan(self.inputs, n, [self.of], self.stages)
                 return n
         raise InputError(f"{self.name!r} cannot be done within a budget of {budget} evaluations")
 
@@ -128,7 +129,7 @@ def compare(
         The outcome analysed.
     reference : float or array
         The exact answer, or a reference far better than any contender; for indices one for each
-        parameter.
+        parameter, in the order of the first contender's inputs.
     budgets : sequence of int
         Numbers of evaluations; each contender takes as many as it can within them.
     replicates : int, default 30
@@ -162,16 +163,12 @@ def compare(
     level = check_confidence(confidence)
     check_count("replicates", replicates, 2)
     seed = seed_of(rng)
-    sizes = [check_count("budget", budget) for budget in budgets]
-    if not sizes or sorted(set(sizes)) != sizes:
-        raise InputError(f"budgets are {list(budgets)}: they must rise, one at least")
+    sizes = _budgets(budgets)
+    if not isinstance(contenders, Mapping) or not contenders:
+        raise InputError("there are no contenders: give a mapping of names, each with its method")
     ready = [_contender(name, entry, model, inputs, of) for name, entry in contenders.items()]
-    if not ready:
-        raise InputError("there are no contenders: give at least one name with its method")
     plans = [[contender.size(budget) for budget in sizes] for contender in ready]
-    truth = np.asarray(reference, dtype=np.float64)
-    if not np.isfinite(truth).all():
-        raise InputError(f"reference is {reference!r}: it must be finite")
+    truth = _reference(reference)
     shape = (len(ready), len(sizes), replicates)
     found = np.full((3, *shape, *truth.shape), np.nan)
     seconds, evaluations = np.full(shape, np.nan), np.zeros(shape[:2], np.int64)
@@ -185,25 +182,56 @@ def compare(
                 started = time.perf_counter()
                 results = contender.results(n, one, n_jobs)
                 seconds[i, j, k] = time.perf_counter() - started
-                found[:, i, j, k] = _values(results, quantity, truth, contender.name)
+                labels = labels or _labels(results, quantity, contender.name)
+                found[:, i, j, k] = _values(results, quantity, truth, labels, contender.name)
                 evaluations[i, j] = int(results["evaluations"])
-                labels = labels or _labels(results, quantity, truth)
             say(f"{contender.name}, {evaluations[i, j]:,} evaluations: {replicates} replicates")
     made = _summarised(found, truth, spawn(seed, 0), level)
-    return _dataset(
-        made, found, seconds, evaluations, truth, [c.name for c in ready], sizes, labels, seed, of
-    )
+    names = [contender.name for contender in ready]
+    results = _dataset(made, found, seconds, evaluations, truth, names, sizes, labels)
+    entries = {one.name: {"method": one.record.title, "of": one.of, **one.stages} for one in ready}
+    return schema.stamp(
+        results,
+        f"compare {', '.join(names)}",
+        model=str(getattr(model, "label", getattr(model, "__qualname__", type(model).__qualname__))),
+        seed=seed,
+        options={"compare": {"quantity": quantity, "confidence": level, "contenders": entries}},
+        inputs=inputs.to_json(),
+    ).assign_attrs(of=of)
+
+
+def _budgets(budgets: Sequence[int]) -> list[int]:
+    """Return budgets that rise."""
+    if not isinstance(budgets, Sequence) or isinstance(budgets, str):
+        raise InputError(f"budgets are {budgets!r}: give a list of numbers of evaluations")
+    sizes = [check_count("budget", budget) for budget in budgets]
+    if not sizes or sorted(set(sizes)) != sizes:
+        raise InputError(f"budgets are {sizes}: they must rise, one at least")
+    return sizes
+
+
+def _reference(reference: ArrayLike) -> Array:
+    """Return the reference as an array of finite numbers."""
+    try:
+        truth = np.asarray(reference, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"reference is {reference!r}: it must be a number, or one for each index") from None
+    if not np.isfinite(truth).all():
+        raise InputError(f"reference is {reference!r}: it must be finite")
+    return truth
 
 
 def _contender(
     name: str, entry: Mapping[str, Any], model: Callable[..., xr.Dataset], inputs: Inputs, of: str
 ) -> Contender:
-    options = dict(entry)
+    options = dict(entry) if isinstance(entry, Mapping) else {}
     if "method" not in options:
-        raise InputError(f"contender {name!r} names no method")
+        raise InputError(f"contender {name!r} names no method: give a mapping with 'method' and its options")
     record = method_named(options.pop("method"))
     own_model, own_inputs = options.pop("model", model), options.pop("inputs", inputs)
     own_of = options.pop("of", of)
+    if not isinstance(own_inputs, Inputs):
+        raise InputError(f"inputs of {name!r} is {type(own_inputs).__name__}: give hipuq.Inputs(...)")
     return Contender(name, record, own_model, own_inputs, own_of, record.split(options))
 
 
@@ -215,9 +243,16 @@ def _name(results: xr.Dataset, quantity: str | None, contender: str) -> str:
     raise InputError(f"the results of {contender!r} have no {' or '.join(asked)} over everything")
 
 
-def _values(results: xr.Dataset, quantity: str | None, truth: Array, contender: str) -> Array:
+def _values(
+    results: xr.Dataset, quantity: str | None, truth: Array, labels: Mapping[str, Any], contender: str
+) -> Array:
     """Return estimate and limits, (3, ...) as the reference; limits are NaN where there are none."""
     name = _name(results, quantity, contender)
+    for dim, coord in labels["coords"].items():
+        if dim in results.coords:
+            if set(results[dim].values) != set(coord.values):
+                raise InputError(f"{name} of {contender!r} has another {dim} than the first contender")
+            results = results.sel({dim: coord.values})
     parts = [results[name + end].values if name + end in results else np.nan for end in ("", "_low", "_high")]
     if np.shape(parts[0]) != truth.shape:
         raise InputError(
@@ -226,8 +261,8 @@ def _values(results: xr.Dataset, quantity: str | None, truth: Array, contender: 
     return np.array([np.broadcast_to(part, truth.shape) for part in parts])
 
 
-def _labels(results: xr.Dataset, quantity: str | None, truth: Array) -> dict[str, Any]:
-    name = _name(results, quantity, "")
+def _labels(results: xr.Dataset, quantity: str | None, contender: str) -> dict[str, Any]:
+    name = _name(results, quantity, contender)
     variable = results[name]
     coords = {dim: variable[dim] for dim in variable.dims}
     return {"attrs": dict(variable.attrs), "dims": list(variable.dims), "coords": coords}
@@ -283,11 +318,9 @@ def _dataset(
     names: list[str],
     budgets: list[int],
     labels: dict[str, Any],
-    seed: int,
-    of: str,
 ) -> xr.Dataset:
     units, extra = labels["attrs"].get("units", ""), labels["dims"]
-    what = labels["attrs"].get("long_name", of)
+    what = labels["attrs"]["long_name"]
     data: dict[str, Any] = {}
     for name, array in zip(("estimate", "low", "high"), found, strict=True):
         text = {"estimate": what, "low": f"{what}, lower limit", "high": f"{what}, upper limit"}[name]
@@ -308,5 +341,4 @@ def _dataset(
         "replicate": ("replicate", count, {"long_name": "replicate", "units": "1"}),
         **labels["coords"],
     }
-    made_of = xr.Dataset(data, coords)
-    return schema.stamp(made_of, f"compare {', '.join(names)}", seed=seed).assign_attrs(of=of)
+    return xr.Dataset(data, coords)

@@ -99,7 +99,7 @@ def as_distribution(value: object, name: str = "distribution") -> Distribution:
         _check_quantiles(found, name)
     except InputError:
         raise
-    except (AssertionError, TypeError, ValueError) as error:
+    except (AssertionError, AttributeError, TypeError, ValueError) as error:
         # chaospy checks its arguments by assert, some of them on first use only; scipy's quantiles
         # of several variables do not broadcast.
         raise InputError(f"{name} is {value!r}, which cannot be used: {error}") from error

@@ -73,6 +73,8 @@ def test_quadrature_is_exact_for_polynomials():
         run(model, hipuq.Inputs(**{f"x{i}": cp.Uniform(0, 1) for i in range(9)}), 10, sampler="quadrature")
     with pytest.raises(hipuq.HipuqError, match="needs the sampler 'quadrature', not 'sobol'"):
         run(model, inputs, 64, fit="quadrature")
+    with pytest.raises(hipuq.HipuqError, match="at most 50"):
+        run(model, inputs, 70, sampler="quadrature")
     with pytest.raises(hipuq.HipuqError, match="degree is 5"):
         run(model, inputs, 4, sampler="quadrature", degree=5)
 
@@ -266,6 +268,8 @@ def test_a_constant_outcome():
         assert np.isnan(results[name]).all()
         assert results[name].attrs["undefined"].startswith("the outcome does not vary")
     assert np.isnan(results["q2"]) and np.isnan(results["loo"])
+    # A mean of many 0.1 is not 0.1 to the last bit.
+    assert np.isnan(run(constant(0.1), LINE, 64)["q2"])
     assert int(results["trusted"]) == 0
     assert "does not vary" in results["trusted"].attrs["reasons"]
 

@@ -97,6 +97,25 @@ def test_indices_too_can_be_compared():
     assert np.isnan(race["coverage"].loc[{"method": "chaos"}]).all()
 
 
+def test_parameters_are_matched_by_name():
+    """A contender may have its inputs in another order than the first one."""
+    turned = hipuq.Inputs(b=cp.Uniform(0.0, 1.0), a=cp.Uniform(0.0, 1.0))
+    contenders = {
+        "one": {"method": "chaos", "degree": 2},
+        "other": {"method": "chaos", "degree": 2, "inputs": turned},
+    }
+    # var y = 97/720 + ...: by hand E(y | a) = a^2 + a / 2, E(y | b) = 1/3 + b / 2
+    first = np.array([4 / 45 + 1 / 12 + 1 / 48, 1 / 48])
+    first = first / (first.sum() + 1 / 144)
+    race = compare(
+        smooth, INPUTS, contenders, of="y", quantity="S1", reference=first, budgets=[64], replicates=2, rng=0
+    )
+    assert race["parameter"].values.tolist() == ["a", "b"]
+    assert float(race["rmse"].max()) < 1e-9
+    assert race.attrs["inputs"] == INPUTS.to_json()
+    assert '"contenders"' in race.attrs["options"]
+
+
 def test_friction_integrated_takes_part():
     model = hipuq.models.two_dof("hoffmann2002")
     exact = hipuq.integrate_friction(model, cp.Uniform(0.0, 0.8))
@@ -141,6 +160,12 @@ def test_friction_integrated_takes_part():
         ({"reference": [1.0, 2.0]}, "the reference has"),
         ({"quantity": "S1"}, "have no S1_overall or S1"),
         ({"replicates": 1}, "replicates is 1"),
+        ({"budgets": 64}, "a list of numbers"),
+        ({"contenders": ["monte_carlo"]}, "a mapping of names"),
+        ({"contenders": {"a": "monte_carlo"}}, "names no method"),
+        ({"contenders": {"a": {"method": "monte_carlo", "inputs": {}}}}, "inputs of 'a' is dict"),
+        ({"reference": "x"}, "it must be a number"),
+        ({"contenders": {"a": {"method": "sobol", "resamples": "many"}}}, "resamples is 'many'"),
     ],
 )
 def test_what_cannot_be_compared(changes, message):

@@ -9,6 +9,7 @@ import xarray as xr
 
 import hipuq
 from hipuq.methods import METHODS
+from hipuq.surrogates.correction import _whole
 from hipuq.surrogates.limit_state import Strata
 
 INPUTS = hipuq.Inputs(x=cp.Uniform(0.0, 1.0), z=cp.Normal(0.0, 1.0))
@@ -52,6 +53,24 @@ def test_limits_over_contact_patterns_hold_the_truth():
         found = hipuq.estimate("monte_carlo", outcomes, WITH_LEVELS, of="y")
         held += float(found["probability_overall_low"]) <= 0.02 <= float(found["probability_overall_high"])
     assert held >= 106
+
+
+def test_strata_of_tied_predictions_have_room():
+    """Where most predictions are the same a stratum may hold fewer points than it should get."""
+    exact, most = np.array([10.0, 20.5, 9.5]), np.array([100, 3, 12])
+    count = _whole(exact, most)
+    assert count.sum() == 40
+    assert (count <= most).all()
+    patterns = hipuq.ContactPatterns(in_contact=(5,), oscillators=9)
+    inputs = hipuq.Inputs(x=cp.Uniform(0.0, 1.0), contact=patterns)
+
+    def model(samples):
+        one = samples["contact"].isel(oscillator=slice(5)).all("oscillator")
+        return xr.Dataset({"y": (one & (np.sin(1e4 * samples["x"]) > 0)).astype(np.float32)})
+
+    found = run(model, inputs, 8, correction=800, population=8192)
+    assert int(found["evaluations"]) == 8 * 126 + 202 + 800
+    assert float(found["probability_overall_low"]) <= 0.5 / 126 <= float(found["probability_overall_high"])
 
 
 def test_levels_that_differ_by_chance_are_no_cause():

@@ -9,7 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from hipuq.errors import InputError
-from hipuq.expansion.polynomials import orthonormal
+from hipuq.expansion.polynomials import HIGHEST_DEGREE, orthonormal
 from hipuq.expansion.variable import Germ, germ_of
 from hipuq.inputs import Inputs
 from hipuq.variation import Input
@@ -158,6 +158,8 @@ class Germs:
         InputError
             If there are more than `NODES_MAXIMUM` nodes, or a discrete input has more than n levels.
         """
+        if n > HIGHEST_DEGREE:
+            raise InputError(f"{n} quadrature nodes for each input are too many, at most {HIGHEST_DEGREE}")
         nodes, weights = self.nodes(n)
         counts = (weights > 0).sum(axis=1)
         if counts.prod(dtype=np.float64) > NODES_MAXIMUM:

@@ -144,7 +144,8 @@ class Check:
         mean = self.strata.mean([self.true] * 3, self.confidence)[0]
         error = self.strata.mean([np.square(self.true - self.predicted)] * 3, self.confidence)[0]
         spread = self.strata.mean([np.square(self.true - mean)] * 3, self.confidence)[0]
-        return 1 - np.divide(error, spread, out=np.full_like(error, np.nan), where=spread > 0)
+        varies = spread > np.square(64 * np.finfo(np.float64).eps * np.abs(mean))
+        return 1 - np.divide(error, spread, out=np.full_like(error, np.nan), where=varies)
 
     @cached_property
     def mean(self) -> Triple:

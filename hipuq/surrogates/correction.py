@@ -117,7 +117,15 @@ def strata_of(
     size = np.bincount(stratum, minlength=STRATA)
     spread = size * np.sqrt(hits / n * (1 - hits / n))
     share = 0.5 * size / size.sum() + 0.5 * spread / spread.sum()
-    exact = share * wanted
-    count = np.floor(exact).astype(np.int64)
-    count[np.argsort(count - exact)[: wanted - int(count.sum())]] += 1
-    return stratum, count
+    return stratum, _whole(share * wanted, size)
+
+
+def _whole(exact: Array, most: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return whole numbers near `exact` with the same sum, none above `most`."""
+    wanted = round(exact.sum())
+    count = np.minimum(np.floor(exact).astype(np.int64), most)
+    while (left := wanted - int(count.sum())) > 0:
+        # One more for each stratum that has room, those first that are the furthest below their share.
+        room = np.flatnonzero(count < most)
+        count[room[np.argsort((count - exact)[room], kind="stable")[:left]]] += 1
+    return count
