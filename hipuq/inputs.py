@@ -118,6 +118,18 @@ class Inputs(Mapping[str, Input]):
         return [name for name, entry in self._entries.items() for _ in range(entry.columns)]
 
     @property
+    def elements(self) -> list[str]:
+        """Name of each column of the unit cube: ``spring_stiffness[3]``, numbered from 1.
+
+        A parameter that has one column keeps its name.
+        """
+        return [
+            name if entry.columns == 1 else f"{name}[{i + 1}]"
+            for name, entry in self._entries.items()
+            for i in range(entry.columns)
+        ]
+
+    @property
     def discrete(self) -> list[str]:
         """Names of the inputs that have levels."""
         return [name for name, e in self._entries.items() if hasattr(e.distribution, "levels")]

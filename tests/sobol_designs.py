@@ -6,7 +6,6 @@ import numpy as np
 import xarray as xr
 
 import hipuq
-from hipuq.estimation.indices import elements
 
 UPPER = np.triu_indices(3, 1)
 
@@ -32,7 +31,7 @@ def grouped_inputs() -> hipuq.Inputs:
 
 
 def problem(inputs, *, groups) -> dict:
-    names = elements(inputs)
+    names = inputs.elements
     extra = {"groups": inputs.groups} if groups else {}
     return {"num_vars": len(names), "names": names, "bounds": [[0, 1]] * len(names)} | extra
 

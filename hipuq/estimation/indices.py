@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.estimation.results import ENDS
-from hipuq.inputs import Inputs
 
 Array = NDArray[np.float64]
 
@@ -20,18 +19,6 @@ ORDERS = {"S1": "first-order index", "ST": "total-order index", "S2": "second-or
 
 REASONS = 3
 """Different reasons that are written out."""
-
-
-def elements(inputs: Inputs) -> list[str]:
-    """Return a name for each column of the unit cube: ``spring_stiffness[3]``, numbered from 1.
-
-    A parameter that has one column keeps its name.
-    """
-    return [
-        name if entry.columns == 1 else f"{name}[{i + 1}]"
-        for name, entry in inputs.items()
-        for i in range(entry.columns)
-    ]
 
 
 def symmetric(pairs: Array, size: int) -> Array:

@@ -55,13 +55,10 @@ class Germs:
             If an input has levels: expansions are made for each of them.
         """
         columns: list[Germ] = []
-        elements: list[str] = []
-        for name, entry in inputs.items():
+        for entry in inputs.values():
             columns += [germ_of(entry.drawn)] * entry.columns
-            single = entry.columns == 1
-            elements += [name] if single else [f"{name}[{i + 1}]" for i in range(entry.columns)]
         largest = np.array([column.largest for column in columns], np.int64)
-        return cls(inputs, tuple(columns), tuple(elements), tuple(inputs.groups), largest)
+        return cls(inputs, tuple(columns), tuple(inputs.elements), tuple(inputs.groups), largest)
 
     def values(self, samples: xr.Dataset) -> Array:
         """Return the germs of physical values.

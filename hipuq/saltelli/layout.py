@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import InputError, SchemaError
-from hipuq.estimation.indices import elements
 from hipuq.inputs import Inputs
 
 Array = NDArray[np.float64]
@@ -41,7 +40,7 @@ class Layout:
     @classmethod
     def of(cls, inputs: Inputs, groups: bool, second_order: bool) -> Layout:
         """Return the layout of a design of all elements of a parameter together, or of each alone."""
-        names = tuple(inputs) if check_flag("groups", groups) else tuple(elements(inputs))
+        names = tuple(inputs) if check_flag("groups", groups) else tuple(inputs.elements)
         return cls(names, check_flag("second_order", second_order))
 
     @property

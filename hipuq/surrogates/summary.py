@@ -170,7 +170,7 @@ def _indices(surrogate: Surrogate, check: Check, inputs: Inputs, groups: bool) -
     found_indices = surrogate.expansion.sobol(members, bool(surrogate.discrete))
     if surrogate.discrete:
         found.append(surrogate.discrete)
-    names = list(inputs) if groups else indices.elements(inputs)
+    names = list(inputs) if groups else inputs.elements
     order = [found.index(name) for name in names]
     whys = [check.undefined(k) for k in range(check.y.shape[1])]
     placed = {}
