@@ -126,14 +126,38 @@ def moments(values: xr.DataArray, groups: NDArray[np.intp], count: int, block: i
             mean[:, column] += _divide(delta * n, both)
             known[:, column] = both
     if infinite:
-        share = infinite / values.sizes["sample"]
-        raise InputError(
-            f"{values.name} is infinite in {infinite} samples ({share:.2%}): it has no mean; "
-            "analyse another outcome"
-        )
+        raise not_finite(str(values.name), infinite, values.sizes["sample"], "it has no mean")
     mean[known == 0] = np.nan
     size = np.bincount(groups, minlength=count).astype(np.float64)
     return Moments(size, *(part.reshape(count, *shape) for part in (known, mean, squares)))
+
+
+def check_finite(name: str, values: Array, outputs: int, samples: int, why: str) -> None:
+    """Raise an InputError if an outcome is infinite anywhere.
+
+    Parameters
+    ----------
+    name : str
+        The outcome.
+    values : array
+        Its values; NaN is allowed.
+    outputs : int
+        Axis of `values` that is not one of samples.
+    samples : int
+        Number of all samples.
+    why : str
+        What cannot be done with it.
+    """
+    count = int(np.any(np.isinf(values), axis=outputs).sum())
+    if count:
+        raise not_finite(name, count, samples, why)
+
+
+def not_finite(name: str, infinite: int, samples: int, why: str) -> InputError:
+    """Return the error for an outcome with infinite values, which names their share."""
+    return InputError(
+        f"{name} is infinite in {infinite} samples ({infinite / samples:.2%}): {why}; analyse another outcome"
+    )
 
 
 def _divide(a: Array, b: Array) -> Array:

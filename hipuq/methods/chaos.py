@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import InputError, SchemaError
+from hipuq.estimation.reduction import check_finite
 from hipuq.estimation.results import check_independent, finished
 from hipuq.inputs import Inputs
 from hipuq.intervals import check_confidence
@@ -294,7 +295,7 @@ def estimate(
     check_independent(outcomes, strata=True)
     state = limit_state_of(values, limit)
     y = values.values.astype(np.float64).reshape(values.sizes["sample"], -1)
-    _check_finite(of, y)
+    check_finite(of, y, 1, len(y), "no polynomial fits that")
     seed = _seed(outcomes, rng)
     books = with_books(outcomes, inputs, held_out, seed)
     surrogate = fitted(outcomes, y, books["stratum"].values == FIT, inputs, basis, nodes)
@@ -320,12 +321,3 @@ def _seed(outcomes: xr.Dataset, rng: Seed) -> int:
     if rng is None and isinstance(own, (int, np.integer)):
         return int(own)
     return seed_of(rng)
-
-
-def _check_finite(of: str, y: Array) -> None:
-    infinite = int(np.isinf(y).any(axis=1).sum())
-    if infinite:
-        raise InputError(
-            f"{of} is infinite in {infinite} samples ({infinite / len(y):.2%}): no polynomial fits that; "
-            "analyse another outcome"
-        )

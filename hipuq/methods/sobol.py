@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import InputError
-from hipuq.estimation.indices import labelled, symmetric, undefined
-from hipuq.estimation.results import ENDS, Kind, finished, kind_of
+from hipuq.estimation.reduction import check_finite
+from hipuq.estimation.results import Kind, finished, kind_of
 from hipuq.inputs import Inputs
 from hipuq.intervals import check_confidence
-from hipuq.saltelli.decomposition import base, indices, reason
+from hipuq.saltelli.decomposition import indices, reason
 from hipuq.saltelli.layout import Layout, check_flag, layout_of
+from hipuq.saltelli.summary import labelled_indices, moments_and_counts
 from hipuq.sampling import Seed, check_count, rows_of, samples_by_block, seed_of, spawn, unit_points
 
 Array = NDArray[np.float64]
@@ -230,7 +231,7 @@ def estimate(
     values = schema.check_outcomes(outcomes, of)
     layout = layout_of(outcomes, inputs)
     table, rows = layout.table(values, outcomes)
-    _check_finite(table, int(rows.sum()), of)
+    check_finite(of, table, 0, int(rows.sum()), "it has no variance")
     layout, table = _of_order(second_order, layout, table)
     verdict = kind_of(values) == Kind("probability")
     seed = _resampling_seed(rng, outcomes)
@@ -250,9 +251,9 @@ def estimate(
         for size, why in zip(sizes, reasons, strict=True)
     ]
     budget = np.cumsum(rows)[np.array(sizes) - 1]
-    results = _labelled(found, reasons, layout, values, budget).assign(_counts(table, values, verdict))
+    results = labelled_indices(found, reasons, layout, values, budget)
     return finished(
-        results,
+        results.assign(moments_and_counts(table, values, verdict)),
         outcomes,
         inputs,
         of=of,
@@ -263,15 +264,6 @@ def estimate(
         minimum_events=minimum_events,
         resampling_seed=seed,
     )
-
-
-def _check_finite(table: Array, samples: int, of: str) -> None:
-    infinite = int(np.isinf(table).any(axis=0).sum())
-    if infinite:
-        raise InputError(
-            f"{of} is infinite in {infinite} samples ({infinite / samples:.2%}): it has no variance; "
-            "analyse another outcome"
-        )
 
 
 def _of_order(second_order: bool | None, layout: Layout, table: Array) -> tuple[Layout, Array]:
@@ -293,59 +285,3 @@ def _resampling_seed(rng: Seed, outcomes: xr.Dataset) -> int:
     if rng is None and isinstance(given, (int, np.integer)) and given >= 0:
         rng = spawn(int(given), STREAM)
     return seed_of(rng)
-
-
-def _labelled(
-    found: list[Array],
-    reasons: list[list[str]],
-    layout: Layout,
-    values: xr.DataArray,
-    budget: NDArray[np.int64],
-) -> xr.Dataset:
-    """Return indices of all budgets, the last one of all outcomes, as a Dataset."""
-    shape, count = values.shape[1:], len(layout.names)
-    places = {"S1": slice(0, count), "ST": slice(count, 2 * count)}
-    whole, settling = found[-1], np.stack([part[:, : 2 * count] for part in found])
-    missing = np.isnan(whole[1:].sum(axis=(0, 1)))
-    no_limits = "the outcome does not vary in some resamples, so there are no limits; take more samples"
-    why = undefined(reasons[-1], values)
-    without = [text or (no_limits if lost else "") for text, lost in zip(reasons[-1], missing, strict=True)]
-    why_limits = undefined(without, values)
-    early = undefined(reasons[0], values)
-    arrays, texts = {}, {}
-    for e, end in enumerate(ENDS):
-        for name, place in places.items():
-            arrays[name + end] = whole[e, place].reshape(count, *shape)
-            key = f"{name}_by_budget{end}"
-            arrays[key] = settling[:, e, place].reshape(len(budget), count, *shape)
-            texts[key] = why or (early and f"at {budget[0]} evaluations: {early}")
-        if layout.second_order:
-            arrays["S2" + end] = symmetric(whole[e, 2 * count :], count).reshape(count, count, *shape)
-    texts |= {name + end: why_limits if end else why for name in ("S1", "ST", "S2") for end in ENDS}
-    return labelled(arrays, layout.names, values, texts, budget)
-
-
-def _counts(table: Array, values: xr.DataArray, verdict: bool) -> dict[str, xr.DataArray]:
-    """Return moments over A and B and counts of an outcome."""
-    known = [base(one) for one in table]
-    with np.errstate(over="ignore"):
-        variance = [both.var(ddof=1) if both.size else np.nan for both in known]
-    name, units = values.attrs.get("long_name", values.name), str(values.attrs.get("units", ""))
-    columns: dict[str, tuple[list[float], str, str]] = {
-        "mean": ([both.mean() if both.size else np.nan for both in known], f"mean of {name}", units),
-        "variance": (variance, f"variance of {name}", f"({units})^2" if units else ""),
-        "base_samples": ([len(both) for both in known], "base points used", "1"),
-        "dropped": ([table.shape[1] - len(both) for both in known], "base points dropped", "1"),
-    }
-    if verdict:
-        for key, value in (("events", 1), ("non_events", 0)):
-            text = f"{key.replace('_', '-')} among the samples of A and B"
-            columns[key] = ([int((both == value).sum()) for both in known], text, "1")
-    return {
-        key: xr.DataArray(
-            np.array(column).reshape(values.shape[1:]),
-            dims=values.dims[1:],
-            attrs={"long_name": text, "units": unit},
-        )
-        for key, (column, text, unit) in columns.items()
-    }
