@@ -36,6 +36,9 @@ def run(
     ] = None,
     jobs: Annotated[int | None, typer.Option("--jobs", help="Threads; default all cores.")] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Seed in place of the study's.")] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on from what an earlier run left in the output folder.")
+    ] = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check the study and count evaluations, nothing else.")
     ] = False,
@@ -53,14 +56,21 @@ def run(
             f"  {analysis.name}: {analysis.method} of {', '.join(analysis.of)} with "
             f"{analysis.model.label}, {analysis.evaluations:,} evaluations"
         )
-    typer.echo(f"  in all {sum(analysis.evaluations for analysis in plan.analyses):,} evaluations")
+    for problem in plan.problems:
+        race = problem.race
+        budgets = " to ".join(f"{budget:,}" for budget in sorted({race.budgets[0], race.budgets[-1]}))
+        typer.echo(
+            f"  {problem.group}: {', '.join(one.name for one in race.contenders)} with {race.label}, "
+            f"{budgets} evaluations, {race.replicates:,} replicates, {problem.evaluations:,} evaluations"
+        )
+    typer.echo(f"  in all {plan.evaluations:,} evaluations")
     if dry_run:
         return
     folder = out if out is not None else Path("results") / plan.name
     try:
-        tree = run_study(plan, folder, n_jobs=jobs, say=typer.echo)
+        tree = run_study(plan, folder, resume=resume, n_jobs=jobs, say=typer.echo)
     except KeyboardInterrupt:
-        _fail(f"interrupted: analyses that were complete are in {folder}", 130)
+        _fail(f"interrupted: what was complete is in {folder}; go on with --resume", 130)
     from hipuq.report.page import write_report
 
     page = write_report(tree, folder)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 import time
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import HipuqError, InputError, ModelError, SchemaError, unknown_name
+from hipuq.progress import progress_bar
 from hipuq.sampling import check_count
 
 Model = Callable[..., xr.Dataset]
@@ -76,7 +76,7 @@ def evaluate(
     blocks = [slice(start, min(start + step, size)) for start in range(0, size, step)]
     started = time.perf_counter()
     parts: list[xr.Dataset | None] = [None] * len(blocks)
-    with _workers(jobs, executor) as pool, _progress(size, progress) as advance:
+    with _workers(jobs, executor) as pool, progress_bar("samples", size, progress) as advance:
         futures: dict[Future[xr.Dataset], int] = {
             pool.submit(_block, model, samples.isel(sample=rows), names, rows.start): i
             for i, rows in enumerate(blocks)
@@ -262,18 +262,3 @@ def _workers(jobs: int, executor: Executor | None) -> Iterator[Executor]:
 
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(jobs) as pool:
         yield pool
-
-
-@contextmanager
-def _progress(size: int, wanted: bool | None) -> Iterator[Callable[[int], None]]:
-    """Give a function that advances a progress bar, or does nothing."""
-    if not (sys.stderr.isatty() if wanted is None else wanted):
-        yield lambda done: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("samples", total=size)
-        yield lambda done: bar.advance(task, done)

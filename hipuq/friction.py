@@ -35,6 +35,9 @@ LARGEST = 1e3
 
 FRICTION = "friction"
 
+INTEGRATED_OUTCOME = {"any_unstable": "probability", "unstable": "probability_by_mode"}
+"""Outcome that is sampled -> the one that gives its probability with friction integrated."""
+
 
 def integrate_friction(model: CEAModel, distribution: object) -> FrictionIntegrated:
     """Return the model with friction integrated over its distribution.

@@ -99,7 +99,7 @@ def load_results(path: str | os.PathLike[str]) -> xr.DataTree:
 
 
 def save_outcomes(outcomes: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write samples or outcomes to a Zarr store, in place of what is there.
+    """Write samples or outcomes to a Zarr store; an old store stays until the new one is complete.
 
     Parameters
     ----------
@@ -113,14 +113,22 @@ def save_outcomes(outcomes: xr.Dataset, path: str | os.PathLike[str]) -> None:
         If it cannot be written, or something else is there.
     """
     folder = Path(path)
+    part, old = (folder.with_name(f".{folder.name}.hipuq-{end}") for end in ("part", "old"))
     with _reported("write", folder):
-        if folder.exists():
-            if not _is_store(folder):
-                raise StoreError(f"cannot write {folder}: something that is not a Zarr store is there")
-            shutil.rmtree(folder)
+        if folder.exists() and not _is_store(folder):
+            raise StoreError(f"cannot write {folder}: something that is not a Zarr store is there")
         folder.parent.mkdir(parents=True, exist_ok=True)
+        # A process that was killed may have left half of them.
+        for half in (part, old):
+            if half.exists():
+                shutil.rmtree(half)
         # Version 2 of the format: version 3 has no settled strings yet.
-        outcomes.drop_encoding().to_zarr(folder, mode="w", zarr_format=2, consolidated=True)
+        outcomes.drop_encoding().to_zarr(part, mode="w", zarr_format=2, consolidated=True)
+        if folder.exists():
+            folder.rename(old)
+        part.rename(folder)
+        if old.exists():
+            shutil.rmtree(old)
 
 
 def load_outcomes(path: str | os.PathLike[str]) -> xr.Dataset:

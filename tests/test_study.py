@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from compare_studies import BOTH
 from helpers import SMALL_STUDY
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -139,6 +140,8 @@ BROKEN = [
     ("seed = 3", "sed = 3", "did you mean 'seed'"),
     ('title = "Small"', "", "title"),
     ('title = "Small"', "title = ", "not a TOML file"),
+    ("upper = 0.1", f"upper = {10**30}", "does not fit into 64 bits"),
+    ('name = "ring"\n', "", "the model has no name: [model] needs one of ring, two_dof"),
 ]
 
 
@@ -185,16 +188,16 @@ def test_a_missing_study_and_an_unwritable_folder(tmp_path):
         hipuq.run_study(study, tmp_path / "file" / "out", progress=False)
 
 
-LINES = SMALL.strip().splitlines()
+LINES = [text.strip().splitlines() for text in (SMALL, BOTH)]
 VALUES = st.sampled_from(
     ["0", "-1", "1e400", "nan", "true", '""', "[]", "{}", '"x"', "[[1]]", "1979-05-27", "9" * 30]
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(data=st.data())
 def test_malformed_studies_never_end_in_anything_but_our_errors(tmp_path_factory, data):
-    lines = list(LINES)
+    lines = list(data.draw(st.sampled_from(LINES)))
     for _ in range(data.draw(st.integers(1, 3))):
         i = data.draw(st.integers(0, len(lines) - 1))
         action = data.draw(st.sampled_from(["drop", "twice", "value", "cut", "swap"]))
@@ -215,7 +218,7 @@ def test_malformed_studies_never_end_in_anything_but_our_errors(tmp_path_factory
     except HipuqError as error:
         assert "\n" not in str(error).strip()
     else:
-        assert study.analyses
+        assert study.analyses or study.problems
         tomllib.loads(study.text)
 
 
@@ -225,4 +228,4 @@ def test_malformed_studies_never_end_in_anything_but_our_errors(tmp_path_factory
 def test_every_study_that_we_ship_loads(folder):
     study = hipuq.load_study(folder)
     assert study.name == folder.name
-    assert all(analysis.evaluations > 0 for analysis in study.analyses)
+    assert all(one.evaluations > 0 for one in (*study.analyses, *study.problems))

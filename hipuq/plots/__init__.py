@@ -26,12 +26,18 @@ function                          shows                                       ta
 `convergence`                     an estimate over the evaluations used       results of ``_by_budget``
 `predicted_against_true`          a surrogate against the model, on           results of ``chaos``
                                   held-out samples
+`error_over_cost`                 error of methods over evaluations or time   results of `hipuq.compare`
+`coverage`                        how many intervals of methods hold the      the same
+                                  answer
+`cost_of_accuracy`                time of methods by that of the baseline     the same
+                                  for the same error
 ================================  ==========================================  ============================
 
 A friction sweep is ``evaluate(model, model.nominal(friction=np.linspace(0, 0.1, 1001)))``;
 `follow_modes` follows modes through one, `lock_in_bracket` reads off where a mode locks in.
 """
 
+from hipuq.plots.comparison import cost_of_accuracy, coverage, error_over_cost
 from hipuq.plots.convergence import convergence
 from hipuq.plots.eigenvalue_plane import damping_over_frequency, root_locus
 from hipuq.plots.fragility_curves import fragility, onset_distribution
@@ -58,6 +64,9 @@ __all__ = [
     "second_order",
     "convergence",
     "predicted_against_true",
+    "error_over_cost",
+    "coverage",
+    "cost_of_accuracy",
     "follow_modes",
     "lock_in_bracket",
 ]

@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from hipuq.errors import SchemaError, check_name
 from hipuq.plots.captions import (
     UNDEFINED,
-    inches,
     legend_below,
     level,
     over,
@@ -23,6 +21,7 @@ from hipuq.plots.captions import (
     selected,
     wrapped,
 )
+from hipuq.plots.scales import label_decades
 from hipuq.plots.style import BLACK, GREY, LINES, axis_label, new_axes
 
 Array = NDArray[np.float64]
@@ -36,10 +35,6 @@ WAY_OUT = "results of the method 'monte_carlo' or 'sobol'"
 
 MARKERS = "o^sDvP"
 """Markers by line style: they stand where estimates were made."""
-
-
-SUBDIVISIONS = ((1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0), (1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
-"""Labels within a decade, the closest first."""
 
 
 def convergence(
@@ -104,7 +99,7 @@ def convergence(
         text = label if label is not None else quantity.removesuffix("_overall")
         text += f", {level(results)}" if bands else ""
         _band(ax, budget, values[:, 0], [band[:, 0] for band in bands], text)
-    _count_evaluations(ax)
+    label_decades(ax.xaxis, count=True)
     ax.grid(axis="y", linewidth=0.4, alpha=0.5)
     ax.set_xlabel(axis_label(whole["budget"]))
     # The estimate itself has the shorter name.
@@ -189,17 +184,3 @@ def _reach(ax: Axes, budget: Array) -> tuple[float, float]:
         left, right = ax.get_xlim()
         least, most = min(least, left), max(most, right)
     return least, most
-
-
-def _count_evaluations(ax: Axes) -> None:
-    """Label the axis of evaluations by plain numbers, as many as there is room for."""
-    left, right = ax.get_xlim()
-    most = max(2, int(inches(ax)[0] / 0.75))
-    exponents = np.arange(np.floor(np.log10(left)), np.ceil(np.log10(right)))
-    for subs in SUBDIVISIONS:
-        ticks = np.outer(10.0**exponents, subs)
-        if ((ticks >= left) & (ticks <= right)).sum() <= most:
-            break
-    ax.xaxis.set_major_locator(LogLocator(subs=subs))
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.0f}"))
-    ax.xaxis.set_minor_formatter(NullFormatter())

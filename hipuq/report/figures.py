@@ -6,12 +6,15 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hipuq import plots
+from hipuq.report.compared import baseline_of
 from hipuq.report.partners import exact_of, groups_of, summed_up
+from hipuq.report.summary import COMPARE, comparisons
 from hipuq.schema import is_exact
 
 SETTLING = ("probability_overall", "probability", "mean_overall", "mean", "S1", "ST")
@@ -42,7 +45,7 @@ class Picture:
     Attributes
     ----------
     analysis : str
-        The analysis that it belongs to.
+        The analysis that it belongs to, or ``compare/<problem>``.
     name : str
         Name of its file.
     caption : str
@@ -91,6 +94,8 @@ def pictures(tree: xr.DataTree) -> Iterator[Picture]:
             yield from _sweep(analysis, groups["friction_sweep"], options)
         for of, results in groups.items():
             yield from _by_method(analysis, of, results)
+    for problem, race in comparisons(tree):
+        yield from _comparison(f"{COMPARE}/{problem}", race)
 
 
 def _occurrence(
@@ -183,3 +188,27 @@ def _by_method(analysis: str, of: str, results: xr.Dataset) -> Iterator[Picture]
             plots.convergence(results, ax=ax, quantity=quantity)
         caption = "Convergence: the estimate from the first evaluations alone, over their number."
         yield Picture(analysis, f"convergence_{of}", caption, figure)
+
+
+def _comparison(group: str, race: xr.Dataset) -> Iterator[Picture]:
+    """Give error over cost, coverage and the cost of accuracy, as far as there are any."""
+    if np.isfinite(race["rmse"]).any():
+        figure = Figure(figsize=(12, 5.2), layout="constrained")
+        for cost, ax in zip(("evaluations", "seconds"), figure.subplots(1, 2), strict=True):
+            plots.error_over_cost(race, ax=ax, cost=cost)
+        caption = "Error of each contender over its evaluations and over the time of a run."
+        yield Picture(group, "error", caption, figure)
+    if np.isfinite(race["coverage"]).any():
+        figure = Figure(figsize=(8, 5), layout="constrained")
+        plots.coverage(race, ax=figure.subplots())
+        caption = "Share of the intervals that hold the reference, over evaluations."
+        yield Picture(group, "coverage", caption, figure)
+    others = race["method"] != baseline_of(race)
+    if np.isfinite(race["cost_ratio"].where(others)).any():
+        figure = Figure(figsize=(8, 5), layout="constrained")
+        plots.cost_of_accuracy(race, ax=figure.subplots())
+        caption = (
+            "What accuracy costs: the time of each contender over that which the baseline, "
+            f"{baseline_of(race)!r}, takes for the same error."
+        )
+        yield Picture(group, "cost", caption, figure)

@@ -13,11 +13,15 @@ import xarray as xr
 
 from hipuq import schema
 from hipuq.errors import StoreError
+from hipuq.report import comparison as methods
+from hipuq.report.comparison_cost import winner_words
 from hipuq.report.figures import pictures
 from hipuq.report.partners import comparison, groups_of
 from hipuq.report.sensitivity import has_indices, note, remarks
 from hipuq.report.summary import (
+    COMPARE,
     bounded,
+    comparisons,
     estimates,
     headline,
     inputs_table,
@@ -29,6 +33,9 @@ from hipuq.report.summary import (
 RESOLUTION = 130
 """Dots per inch of the pictures."""
 
+WIDE = 10.5
+"""Width [inch] above which a picture is shown larger where the screen is small."""
+
 
 def write_report(tree: xr.DataTree, folder: str | os.PathLike[str]) -> Path:
     """Write the figures and the report of a results tree.
@@ -38,7 +45,8 @@ def write_report(tree: xr.DataTree, folder: str | os.PathLike[str]) -> Path:
     tree : DataTree
         As from `hipuq.run_study` or `hipuq.load_results`.
     folder : path
-        Gets ``figures/<analysis>-<figure>.png`` and ``report.html``.
+        Gets ``figures/<analysis>-<figure>.png``, ``figures/compare-<problem>-<figure>.png`` and
+        ``report.html``.
 
     Returns
     -------
@@ -59,10 +67,12 @@ def write_report(tree: xr.DataTree, folder: str | os.PathLike[str]) -> Path:
         for picture in pictures(tree):
             buffer = io.BytesIO()
             picture.figure.savefig(buffer, format="png", dpi=RESOLUTION)
-            name = f"{picture.analysis}-{picture.name}.png"
+            name = f"{picture.analysis.replace('/', '-')}-{picture.name}.png"
             (target / "figures" / name).write_bytes(buffer.getvalue())
             data = base64.b64encode(buffer.getvalue()).decode("ascii")
-            images.setdefault(picture.analysis, []).append({"data": data, "caption": picture.caption})
+            kind = "wide" if picture.figure.get_figwidth() > WIDE else ""
+            image = {"data": data, "caption": picture.caption, "kind": kind}
+            images.setdefault(picture.analysis, []).append(image)
         environment = jinja2.Environment(
             loader=jinja2.PackageLoader("hipuq.report", "."),
             autoescape=True,
@@ -83,7 +93,7 @@ def content(tree: xr.DataTree, images: dict[str, list[dict[str, str]]]) -> dict[
     ----------
     tree : DataTree
     images : dict
-        Pictures by analysis.
+        Pictures by analysis, or ``compare/<problem>``.
 
     Returns
     -------
@@ -123,4 +133,17 @@ def content(tree: xr.DataTree, images: dict[str, list[dict[str, str]]]) -> dict[
                 "confidence": f"{first.attrs['confidence']:.0%}",
             }
         )
-    return {"study": tree.attrs, "sections": sections, "indices": indices}
+    races = [
+        {
+            "name": problem,
+            "label": methods.label(race),
+            "lead": winner_words(race),
+            "facts": methods.facts(race),
+            "remarks": methods.remarks(race),
+            "tables": methods.tables(race),
+            "images": images.get(f"{COMPARE}/{problem}", []),
+            "given": [methods.contender_table(race), inputs_table(race)],
+        }
+        for problem, race in comparisons(tree)
+    ]
+    return {"study": tree.attrs, "sections": sections, "comparisons": races, "indices": indices}

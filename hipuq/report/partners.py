@@ -9,14 +9,12 @@ from typing import TypeGuard
 import numpy as np
 import xarray as xr
 
+from hipuq.friction import INTEGRATED_OUTCOME
 from hipuq.report.summary import analyses
 from hipuq.schema import is_exact
 
 Found = Mapping[str, Mapping[str, xr.Dataset]]
 """Analysis -> name of a group -> its Dataset."""
-
-EXACT = {"any_unstable": "probability", "unstable": "probability_by_mode"}
-"""Outcome that is sampled -> the one that gives its probability with friction integrated."""
 
 
 def groups_of(tree: xr.DataTree) -> dict[str, dict[str, xr.Dataset]]:
@@ -54,7 +52,7 @@ def exact_of(sampled: xr.Dataset, found: Found) -> str | None:
     label = f"{sampled.attrs.get('model', '')}, friction integrated"
     dims = {str(dim) for dim in sampled["probability_mean"].dims}
     for analysis, groups in found.items():
-        exact = groups.get(EXACT.get(str(sampled.attrs.get("of")), ""))
+        exact = groups.get(INTEGRATED_OUTCOME.get(str(sampled.attrs.get("of")), ""))
         if (
             summed_up(exact, dims)
             and is_exact(exact)
@@ -92,7 +90,7 @@ def comparison(analysis: str, found: Found) -> str:
     for sampled in _summed(found[analysis]):
         other = exact_of(sampled, found)
         if other is not None:
-            held, count = _held(sampled, found[other][EXACT[str(sampled.attrs["of"])]])
+            held, count = _held(sampled, found[other][INTEGRATED_OUTCOME[str(sampled.attrs["of"])]])
             by = "group and mode" if "mode" in sampled["probability_mean"].dims else "group"
             level = f"{sampled.attrs['confidence']:.0%}"
             line = f"{level} intervals that hold the exact value ({other})"

@@ -21,6 +21,9 @@ SAME = 1e-12
 STUDY_ATTRS = ("title", "description", "study", "seed", "report", "study_file", "hipuq_version")
 """Attributes that the results of a study have."""
 
+COMPARE = "compare"
+"""Group of a results tree that holds the comparisons of methods."""
+
 
 def analyses(tree: xr.DataTree) -> list[str]:
     """Return the names of the analyses in a results tree, in its order.
@@ -33,7 +36,13 @@ def analyses(tree: xr.DataTree) -> list[str]:
     missing = [key for key in STUDY_ATTRS if key not in tree.attrs]
     if missing:
         raise SchemaError(f"these are not the results of a study: the attribute {missing[0]!r} is missing")
-    return [str(name) for name in tree.children]
+    return [str(name) for name in tree.children if name != COMPARE]
+
+
+def comparisons(tree: xr.DataTree) -> Iterator[tuple[str, xr.Dataset]]:
+    """Give the comparisons of methods: the name of the problem and its Dataset."""
+    for problem, node in tree[COMPARE].children.items() if COMPARE in tree.children else ():
+        yield str(problem), node.to_dataset(inherit=False)
 
 
 def estimates(tree: xr.DataTree, analysis: str) -> Iterator[tuple[str, xr.Dataset]]:

@@ -10,6 +10,12 @@ import xarray as xr
 MISSING = "n/a"
 """What stands for a number that does not exist."""
 
+NEVER = "never"
+"""What stands for a number that cannot be reached."""
+
+UNITS_OF_TIME = (("h", 3600.0), ("min", 60.0), ("s", 1.0), ("ms", 1e-3), ("µs", 1e-6))
+"""Units of time, from the longest -> seconds."""
+
 
 @dataclass(frozen=True)
 class Table:
@@ -21,12 +27,15 @@ class Table:
     columns : list of str
         Headings, with units.
     rows : list of list of str
-        Cells as they are shown.
+        Cells as they are shown; a line break in one stays.
+    note : str
+        What its marks mean; may be empty.
     """
 
     title: str
     columns: list[str]
     rows: list[list[str]]
+    note: str = ""
 
 
 def number(value: float, digits: int = 4) -> str:
@@ -38,6 +47,46 @@ def share(value: float, digits: int = 4) -> str:
     """Return a probability, or another share, as text with fixed decimals."""
     # Adding 0 takes the sign from a rounded 0.
     return MISSING if np.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """Return a number as text with so many digits, zeros at the end included."""
+    if not np.isfinite(value):
+        return MISSING
+    return f"{value:#.{digits}g}".rstrip(".") if value else "0"
+
+
+def count(value: float) -> str:
+    """Return a count, or an estimate of one, as text: in full up to a million."""
+    if np.isnan(value):
+        return MISSING
+    if np.isinf(value):
+        return NEVER
+    return f"{value:,.0f}" if value < 1e6 else f"{value:.2e}"
+
+
+def factor(value: float) -> str:
+    """Return a ratio as text with two digits."""
+    if not np.isfinite(value):
+        return MISSING
+    return f"{float(f'{value:.2g}'):,.0f}" if value >= 100 else significant(value, 2)
+
+
+def percent(value: float) -> str:
+    """Return a share in per cent, with one decimal."""
+    return MISSING if np.isnan(value) else f"{100 * value:.1f} %"
+
+
+def duration(seconds: float) -> str:
+    """Return a time in the unit that it is read in, from µs to h."""
+    if not np.isfinite(seconds):
+        return MISSING
+    # What rounds up to the next unit is told in that.
+    unit, size = next(
+        ((unit, size) for unit, size in UNITS_OF_TIME if float(f"{seconds:.3g}") >= size), UNITS_OF_TIME[-1]
+    )
+    value = seconds / size
+    return f"{value:.3g} {unit}" if value < 999.5 else f"{value:,.0f} {unit}"
 
 
 def sentence(text: str) -> str:

@@ -11,9 +11,11 @@ from rich.markup import escape
 from rich.table import Table as RichTable
 
 from hipuq import schema
+from hipuq.report import comparison as methods
+from hipuq.report.comparison_error import error_table
 from hipuq.report.partners import comparison, groups_of
 from hipuq.report.sensitivity import has_indices, remarks
-from hipuq.report.summary import estimates, headline, tables, trust
+from hipuq.report.summary import comparisons, estimates, headline, tables, trust
 from hipuq.report.table import Table
 
 
@@ -47,6 +49,22 @@ def show_results(tree: xr.DataTree, console: Console | None = None) -> None:
                 screen.print(printed(table))
         if line := comparison(analysis, found):
             screen.print(escape(line))
+    races = dict(comparisons(tree))
+    for problem, race in races.items():
+        _show_comparison(problem, race, screen)
+    if not found and not races:
+        screen.print("there are no results in it")
+
+
+def _show_comparison(problem: str, race: xr.Dataset, screen: Console) -> None:
+    """Print who is how far off, who wins, whose intervals fail and what pays."""
+    screen.print(f"\n[bold]compare {escape(problem)}[/bold]: {escape(methods.label(race))}")
+    for line in methods.facts(race):
+        screen.print(escape(line))
+    table = error_table(race, brief=True)
+    screen.print(printed(table))
+    for line in filter(None, [table.note, *methods.summary(race)]):
+        screen.print(escape(line))
 
 
 def screen_for(console: Console | None) -> Console:

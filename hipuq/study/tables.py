@@ -1,12 +1,10 @@
-"""The form of a study file: which tables and keys it has, and of what type."""
+"""The form of the tables of a study file: which keys they have, and of what type."""
 
 from __future__ import annotations
 
-import tomllib
-from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from hipuq.contact import ContactPatterns
 from hipuq.distributions import FAMILIES, from_family
@@ -14,7 +12,9 @@ from hipuq.errors import HipuqError, StudyError, unknown_name
 from hipuq.variation import relative, shift
 
 CONTACT_PATTERNS = "contact_patterns"
-MAXIMUM_BYTES = 1_000_000
+
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]*$"
+"""What an analysis or a problem may be called: its group and its files are."""
 
 
 class Table(BaseModel):
@@ -98,7 +98,7 @@ class AnalysisTable(Table):
         What this analysis has in place of the study's.
     """
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=60)
+    name: str = Field(pattern=NAME, max_length=60)
     method: str
     n: int = Field(ge=1)
     integrate_friction: bool = False
@@ -164,93 +164,3 @@ class ReportTable(Table):
             if not (key.isascii() and key.isdecimal()):
                 raise ValueError(f"{key!r} is not the number of a mode")
         return value
-
-
-class StudyFile(Table):
-    """A whole study file.
-
-    Attributes
-    ----------
-    title, description : str
-        For people.
-    seed : int
-        Seed of all randomness.
-    model : dict
-        ``name``, ``preset`` and options of the model.
-    inputs : dict
-        Parameter -> its distribution.
-    analysis : list
-        The analyses, in order.
-    report : ReportTable
-    """
-
-    title: str = Field(min_length=1)
-    description: str = ""
-    seed: int = Field(default=0, ge=0, lt=2**63)
-    model: dict[str, Any]
-    inputs: dict[str, InputTable] = Field(min_length=1)
-    analysis: list[AnalysisTable] = Field(min_length=1)
-    report: ReportTable = ReportTable()
-
-    @model_validator(mode="after")
-    def _distinct(self) -> StudyFile:
-        names = [entry.name for entry in self.analysis]
-        twice = {name for name in names if names.count(name) > 1}
-        if twice:
-            raise ValueError(f"the name {min(twice)!r} is given to two analyses")
-        return self
-
-
-def read_study_file(file: Path) -> tuple[str, StudyFile]:
-    """Read a study file and check its form.
-
-    Parameters
-    ----------
-    file : Path
-
-    Returns
-    -------
-    text : str
-        As it is in the file.
-    table : StudyFile
-
-    Raises
-    ------
-    StudyError
-        One line that names the file and the key.
-    """
-    try:
-        if file.stat().st_size > MAXIMUM_BYTES:
-            raise StudyError(f"{file} is larger than {MAXIMUM_BYTES} bytes: it is not a study file")
-        text = file.read_text(encoding="utf-8")
-        data = tomllib.loads(text)
-    except OSError as error:
-        raise StudyError(
-            f"cannot read the study {file}: {error.strerror}; give a study folder or its study.toml"
-        ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise StudyError(f"{file} is not a TOML file: {error}") from error
-    try:
-        return text, StudyFile.model_validate(data)
-    except ValidationError as error:
-        raise StudyError(f"{file}, {_first_line(error, data)}") from error
-
-
-_TABLES: dict[str, type[BaseModel]] = {"analysis": AnalysisTable, "report": ReportTable}
-
-
-def _first_line(error: ValidationError, data: dict[str, Any]) -> str:
-    """Return the first problem as one line, with the near match of an unknown key."""
-    # A key that is not known explains one that is missing.
-    first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
-    place = [str(part) for part in first["loc"]]
-    if first["type"] == "extra_forbidden":
-        table = _TABLES.get(place[0], StudyFile) if len(place) > 1 else StudyFile
-        where = f"table {place[0]!r}" if len(place) > 1 else "study file"
-        return str(unknown_name(f"key in the {where}", place[-1], table.model_fields))
-    message = first["msg"].removeprefix("Value error, ")
-    shown = "" if first["type"] in ("missing", "value_error") else f", not {str(first['input'])[:60]!r}"
-    where = ".".join(place)
-    more = len(error.errors()) - 1
-    rest = f" (and {more} more)" if more else ""
-    return f"{where}: {message}{shown}{rest}" if where else f"{message}{rest}"

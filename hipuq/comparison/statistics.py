@@ -1,0 +1,257 @@
+"""Error, coverage, convergence and cost of contenders, over their replicates, with limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hipuq.intervals import wilson
+
+Array = NDArray[np.float64]
+
+RESAMPLES = 1000
+"""Resamples of the replicates for the limits of a root mean square error."""
+
+ROUNDING = 1e-10
+"""Relative distance by which a limit may miss an exact reference: what exact methods are good for."""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """All that was run, and the answer.
+
+    Attributes
+    ----------
+    estimate, low, high : (m, b, r, ...) array
+        Of m contenders, b budgets and r replicates, over the dims of what is compared; NaN where there is
+        none.
+    seconds, model_seconds : (m, b, r) array
+        Of a run, and of the model in it [s].
+    evaluations : (m, b) array of int
+        Model runs of one run; 0 where a contender does not take part.
+    replicates : (m, b) array of int
+        Runs.
+    reference : (...) array
+    exact : bool
+        Whether the reference is exact.
+    """
+
+    estimate: Array
+    low: Array
+    high: Array
+    seconds: Array
+    model_seconds: Array
+    evaluations: NDArray[np.int64]
+    replicates: NDArray[np.int64]
+    reference: Array
+    exact: bool
+
+    def each(self) -> list[tuple[int, int, int]]:
+        """Return contender, budget and number of replicates of every cell that was run."""
+        return [(i, j, int(r)) for (i, j), r in np.ndenumerate(self.replicates) if r > 0]
+
+
+def errors(
+    cells: Cells, rng: Callable[[int, int], np.random.Generator], level: float
+) -> tuple[dict[str, Array], Array]:
+    """Return bias, root mean square error and coverage of each cell.
+
+    Parameters
+    ----------
+    cells : Cells
+    rng : callable
+        Contender and budget by number -> generator of its resamples.
+    level : float
+        Of the limits.
+
+    Returns
+    -------
+    numbers : dict of (m, b, ...) or (m, b) array
+        By name; NaN in cells that were not run, or in which a replicate has no estimate. What ends in
+        ``_overall`` is over the extra dims too.
+    resampled : (RESAMPLES, m, b) array
+        Root mean square errors, over the extra dims too, of resampled replicates.
+    """
+    shape = cells.replicates.shape
+    extra = cells.reference.shape
+    names = ("bias", "bias_error", *(f"{n}{e}" for n in ("rmse", "coverage") for e in ("", "_low", "_high")))
+    found = {name: np.full(shape + extra, np.nan) for name in names}
+    overall = {f"{n}_overall{e}": np.full(shape, np.nan) for n in ("rmse", "coverage") for e in _ENDS}
+    resampled = np.full((RESAMPLES, *shape), np.nan)
+    ends = [0.5 - level / 2, 0.5 + level / 2]
+    for i, j, count in cells.each():
+        error = cells.estimate[i, j, :count] - cells.reference
+        squares = np.square(error).reshape(count, -1)
+        drawn = rng(i, j).multinomial(count, np.full(count, 1 / count), size=RESAMPLES)
+        by_resample = drawn @ squares / count
+        found["bias"][i, j] = error.mean(axis=0)
+        found["bias_error"][i, j] = error.std(axis=0, ddof=1) / np.sqrt(count)
+        found["rmse"][i, j] = np.sqrt(squares.mean(axis=0)).reshape(extra)
+        low, high = np.quantile(np.sqrt(by_resample), ends, axis=0)
+        found["rmse_low"][i, j], found["rmse_high"][i, j] = low.reshape(extra), high.reshape(extra)
+        resampled[:, i, j] = np.sqrt(by_resample.mean(axis=1))
+        overall["rmse_overall"][i, j] = np.sqrt(squares.mean())
+        overall["rmse_overall_low"][i, j], overall["rmse_overall_high"][i, j] = np.quantile(
+            resampled[:, i, j], ends
+        )
+        hits, told = _held(cells, i, j, count)
+        found["coverage"][i, j], *limits = _share(hits.sum(axis=0), told.sum(axis=0), level)
+        found["coverage_low"][i, j], found["coverage_high"][i, j] = limits
+        # Results of one run hang together: no more trials than runs.
+        every = max(hits[0].size, 1)
+        middle, *limits = _share(hits.sum() / every, told.sum() / every, level)
+        overall["coverage_overall"][i, j] = middle
+        overall["coverage_overall_low"][i, j], overall["coverage_overall_high"][i, j] = limits
+    return found | (overall if extra else {}), resampled
+
+
+_ENDS = ("", "_low", "_high")
+
+
+def _held(cells: Cells, i: int, j: int, count: int) -> tuple[Array, Array]:
+    """Return which intervals hold the reference, and which there are, (count, ...)."""
+    low, high = cells.low[i, j, :count], cells.high[i, j, :count]
+    reach = ROUNDING * np.abs(cells.reference) if cells.exact else 0.0
+    told = np.isfinite(low) & np.isfinite(high)
+    held = (low - reach <= cells.reference) & (cells.reference <= high + reach) & told
+    return held.astype(np.float64), told.astype(np.float64)
+
+
+def _share(hits: Array, n: Array, level: float) -> tuple[Array, Array, Array]:
+    """Return a share with its limits; NaN without trials."""
+    hits, n = np.asarray(hits, np.float64), np.asarray(n, np.float64)
+    middle = np.divide(hits, n, out=np.full_like(hits, np.nan), where=n > 0)
+    low, high = wilson(hits, n, level)
+    return middle, np.where(n > 0, low, np.nan), np.where(n > 0, high, np.nan)
+
+
+def ranks(rmse: Array, resampled: Array, level: float) -> dict[str, Array]:
+    """Return the error of each contender over the lowest one at its budget.
+
+    Parameters
+    ----------
+    rmse : (m, b) array
+    resampled : (RESAMPLES, m, b) array
+        As from `errors`.
+    level : float
+
+    Returns
+    -------
+    dict of (m, b) array
+        ``rmse_ratio`` with limits; 1 for the lowest. NaN where there is no error to compare, and for
+        others where the lowest is 0.
+    """
+    ratio, low, high = np.full((3, *rmse.shape), np.nan)
+    ends = [0.5 - level / 2, 0.5 + level / 2]
+    for j in range(rmse.shape[1]):
+        known = np.flatnonzero(np.isfinite(rmse[:, j]))
+        if not known.size:
+            continue
+        best = known[rmse[known, j].argmin()]
+        for i in known:
+            if i == best:
+                ratio[i, j] = low[i, j] = high[i, j] = 1.0
+            elif rmse[best, j] > 0:
+                ratio[i, j] = rmse[i, j] / rmse[best, j]
+                # Some resamples may hold nothing but hits.
+                parts = resampled[:, best, j]
+                drawn = np.divide(resampled[:, i, j], parts, out=np.full_like(parts, np.inf), where=parts > 0)
+                low[i, j], high[i, j] = np.quantile(drawn, ends, method="inverted_cdf")
+            else:
+                ratio[i, j] = low[i, j] = high[i, j] = np.inf if rmse[i, j] > 0 else 1.0
+    return {"rmse_ratio": ratio, "rmse_ratio_low": low, "rmse_ratio_high": high}
+
+
+def rates(rmse: Array, resampled: Array, evaluations: NDArray[np.int64], level: float) -> dict[str, Array]:
+    """Return how errors fall: the slope of log error over log evaluations.
+
+    Parameters
+    ----------
+    rmse, evaluations : (m, b) array
+    resampled : (RESAMPLES, m, b) array
+    level : float
+
+    Returns
+    -------
+    dict of (m) array
+        ``rate`` with limits; NaN with fewer than three budgets or an error of 0.
+    """
+    rate, low, high = np.full((3, len(rmse)), np.nan)
+    for i in range(len(rmse)):
+        cells = np.isfinite(rmse[i]) & (evaluations[i] > 0)
+        if cells.sum() < 3 or not (resampled[:, i, cells] > 0).all() or not (rmse[i, cells] > 0).all():
+            continue
+        x = np.log(evaluations[i, cells])
+        x = x - x.mean()
+        rate[i] = x @ np.log(rmse[i, cells]) / (x @ x)
+        slopes = np.log(resampled[:, i, cells]) @ x / (x @ x)
+        low[i], high[i] = np.quantile(slopes, [0.5 - level / 2, 0.5 + level / 2])
+    return {"rate": rate, "rate_low": low, "rate_high": high}
+
+
+def costs(cells: Cells, rmse: Array, baseline: int, same_model: list[bool]) -> dict[str, Array]:
+    """Return what the error of each contender would cost the baseline, and when the contender pays.
+
+    Parameters
+    ----------
+    cells : Cells
+    rmse : (m, b) array
+    baseline : int
+        Number of the contender that others are held against; its error is taken to fall as n**-1/2.
+    same_model : list of bool
+        Which contenders evaluate the model of the baseline.
+
+    Returns
+    -------
+    dict of (m, b) array
+        ``run_time`` and ``model_time``, medians over the replicates [s], ``baseline_evaluations``,
+        ``cost_ratio`` and ``break_even`` [s].
+    """
+    shape = rmse.shape
+    whole, model, plain, ratio, even = np.full((5, *shape), np.nan)
+    for i, j, count in cells.each():
+        whole[i, j] = np.median(cells.seconds[i, j, :count])
+        model[i, j] = np.median(cells.model_seconds[i, j, :count])
+    found = {
+        "run_time": whole,
+        "model_time": model,
+        "baseline_evaluations": plain,
+        "cost_ratio": ratio,
+        "break_even": even,
+    }
+    own = np.isfinite(rmse[baseline]) & (rmse[baseline] > 0)
+    if not own.any():
+        return found
+    n = cells.evaluations[baseline, own].astype(np.float64)
+    scale = np.average(n * rmse[baseline, own] ** 2, weights=cells.replicates[baseline, own])
+    total = _line(n, whole[baseline, own])
+    beside = _line(n, (whole - model)[baseline, own])
+    for i, j, _ in cells.each():
+        if np.isnan(rmse[i, j]):
+            continue
+        needed = scale / rmse[i, j] ** 2 if rmse[i, j] > 0 else np.inf
+        if i == baseline:
+            # Its own evaluations, not those of the line through its errors.
+            needed = float(cells.evaluations[i, j])
+        plain[i, j] = needed
+        ratio[i, j] = whole[i, j] / total(needed) if np.isfinite(needed) else 0.0
+        if same_model[i] and i != baseline:
+            saved = needed - cells.evaluations[i, j]
+            more = whole[i, j] - model[i, j] - beside(needed)
+            even[i, j] = np.inf if saved <= 0 else max(more / saved, 0.0) if np.isfinite(saved) else 0.0
+    return found
+
+
+def _line(n: Array, seconds: Array) -> Callable[[float], float]:
+    """Return the time of so many evaluations: between those measured, and on the line through them beyond."""
+    most = seconds[-1] / n[-1]
+    slope = float(np.clip(np.polyfit(n, seconds, 1)[0], 0.0, most)) if len(n) > 1 else most
+
+    def time(evaluations: float) -> float:
+        beyond = max(evaluations - float(n[-1]), 0.0)
+        return float(np.interp(evaluations, n, seconds)) + (slope or most) * beyond
+
+    return time

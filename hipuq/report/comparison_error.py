@@ -1,0 +1,230 @@
+"""How far contenders are from the answer: tables of error, bias and intervals, and what is said of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from scipy.special import ndtr, stdtrit
+
+from hipuq.plots.captions import parameter_label
+from hipuq.report.compared import (
+    BEST,
+    NOT_TOLD_APART,
+    Array,
+    Flags,
+    at_budgets,
+    budgets_of,
+    extras_of,
+    level_of,
+    listed,
+    marks,
+    names_of,
+    parts_of,
+    rounding_of,
+    span,
+    undefined,
+    values,
+)
+from hipuq.report.table import MISSING, Table, percent, significant, with_unit
+
+SIGMAS = 3.0
+"""Standard errors beyond which a mean error is no accident, where replicates are many."""
+
+NARROW = 1.6
+"""Shares of misses, over the stated one, above which intervals are called too narrow: 8 % for 5 %."""
+
+WIDE = 0.4
+"""Shares of misses, over the stated one, below which intervals are called conservative: 2 % for 5 %."""
+
+
+def error_table(race: xr.Dataset, *, brief: bool = False) -> Table:
+    """Return the root mean square errors, a row for each contender, a column for each budget.
+
+    Parameters
+    ----------
+    race : Dataset
+        As from `hipuq.compare`.
+    brief : bool, default False
+        Whether to leave out limits and evaluations.
+
+    Returns
+    -------
+    Table
+        With the rate at which errors fall, where any is known.
+    """
+    rmse, low, high = (values(race, "rmse", end) for end in ("", "_low", "_high"))
+    used, open_, marked = values(race, "evaluations"), undefined(race), marks(race)
+    rates = np.isfinite(race["rate"].values).any()
+    rows = []
+    for i, name in enumerate(names_of(race)):
+        cells = []
+        for j, budget in enumerate(budgets_of(race)):
+            lines = [f"{significant(rmse[i, j])} {marked[i][j]}".strip()]
+            if not brief and low[i, j] < high[i, j]:
+                lines.append(f"{significant(low[i, j])} to {significant(high[i, j])}")
+            if np.isnan(rmse[i, j]) and open_[i, j]:
+                lines.append(_open(race, i, j, int(open_[i, j]), brief=brief))
+            if not brief and used[i, j] not in (0, budget):
+                lines.append(f"{used[i, j]:,.0f} evaluations")
+            cells.append("\n".join(lines))
+        rows.append([name, *cells, *([_rate(race, i, brief=brief)] if rates else [])])
+    columns = ["contender", *(f"{budget:,}" for budget in budgets_of(race)), *(["falls as"] if rates else [])]
+    return Table(f"Error: {_errors(race)}, by budget of evaluations", columns, rows, _legend(marked))
+
+
+def _errors(race: xr.Dataset) -> str:
+    """Return what errors are, with their unit."""
+    text = "root mean square error"
+    if parts := parts_of(race):
+        text += f" over the {parts}"
+    return with_unit(text, race["rmse"])
+
+
+def _open(race: xr.Dataset, i: int, j: int, count: int, *, brief: bool) -> str:
+    """Say in how many replicates there is no estimate."""
+    return "undefined" if brief else f"undefined in {count} of {int(race['replicates'][i, j])}"
+
+
+def _rate(race: xr.Dataset, i: int, *, brief: bool) -> str:
+    """Return how the error of a contender falls with evaluations."""
+    rate, low, high = (float(race[f"rate{end}"][i]) for end in ("", "_low", "_high"))
+    if not np.isfinite(rate):
+        return MISSING
+    limits = f"\n{low:.2f} to {high:.2f}" if np.isfinite([low, high]).all() and not brief else ""
+    return f"n^{rate:.2f}{limits}"
+
+
+def _legend(marked: list[list[str]]) -> str:
+    """Return what the marks in a table mean."""
+    seen = {mark for row in marked for mark in row}
+    said = {BEST: "the lowest error of a budget", NOT_TOLD_APART: "not told apart from it"}
+    return "; ".join(f"{mark} {text}" for mark, text in said.items() if mark in seen)
+
+
+def bias_table(race: xr.Dataset) -> Table:
+    """Return mean errors in their standard errors; of several parts that which is the farthest off."""
+    far, where, flags, open_ = _standardised(race)
+    rows = []
+    for i, name in enumerate(names_of(race)):
+        cells = []
+        for j in range(race.sizes["budget"]):
+            text = MISSING if np.isnan(far[i, j]) else f"{far[i, j] + 0.0:+.1f}"
+            if np.isinf(far[i, j]):
+                text = "each time off"
+            if not np.isnan(far[i, j]) and extras_of(race):
+                text += f"\n{_label(race, int(where[i, j]))}"
+            if flags[i, j]:
+                text += "\nbiased?" if open_[i, j] else "\nbiased"
+            cells.append(text)
+        rows.append([name, *cells])
+    title = "Bias: mean error over its standard error, by budget of evaluations"
+    if parts := parts_of(race):
+        title += f"; of the {parts} that which is farthest off"
+    note = f"biased: beyond {_bar(race)} standard errors" if flags.any() else ""
+    if (flags & open_).any():
+        note += "; biased?: the limits of the reference hold the mean estimate"
+    return Table(title, _columns(race), rows, note)
+
+
+def bias_words(race: xr.Dataset) -> str:
+    """Return who is biased, and where; empty where nobody is seen to be."""
+    far, _, flags, open_ = _standardised(race)
+    told = np.isfinite(far) | flags
+    found = [
+        f"{name} {at_budgets(race, sure, told[i])}"
+        for i, (name, sure) in enumerate(zip(names_of(race), flags & ~open_, strict=True))
+        if sure.any()
+    ]
+    return f"Biased, as far as the replicates tell: {'; '.join(found)}" if found else ""
+
+
+def _standardised(race: xr.Dataset) -> tuple[Array, np.ndarray, Flags, Flags]:
+    """Return mean error over standard error, the part it is of, whether biased, whether that is open."""
+    shape = (race.sizes["method"], race.sizes["budget"], -1)
+    extras = extras_of(race)
+    bias, error = (
+        race[name].transpose("method", "budget", *extras).values.reshape(shape)
+        for name in ("bias", "bias_error")
+    )
+    rounding = rounding_of(race)
+    # The same answer each time has no scatter: it is right, or off by more than chance.
+    always = np.where(np.isnan(bias), np.nan, np.copysign(np.inf, bias))
+    over = np.divide(bias, error, out=always, where=~(error <= rounding))
+    over = np.where(np.abs(bias) <= rounding, 0.0, over)
+    where = np.where(np.isnan(over), -1.0, np.abs(over)).argmax(axis=2)
+    far, off = (np.take_along_axis(part, where[..., None], 2)[..., 0] for part in (over, bias))
+    truth, low, high = (race[f"reference{end}"].values.ravel()[where] for end in ("", "_low", "_high"))
+    open_ = (low < high) & (low <= truth + off) & (truth + off <= high)
+    return far, where, np.abs(far) > _bars(race), open_
+
+
+def _bars(race: xr.Dataset) -> Array:
+    """Return the standard errors beyond which chance does not reach, (m, b).
+
+    As improbable as `SIGMAS` for a normal number, where replicates are few or the farthest of several
+    parts is taken.
+    """
+    freedom = np.maximum(values(race, "replicates") - 1.0, 1.0)
+    return np.asarray(-stdtrit(freedom, ndtr(-SIGMAS) / race["reference"].size), np.float64)
+
+
+def _bar(race: xr.Dataset) -> str:
+    """Return the standard errors from which on a mean error is called biased."""
+    ran = values(race, "replicates") > 0
+    return span([f"{bar:.1f}" for bar in sorted(_bars(race)[ran])])
+
+
+def _label(race: xr.Dataset, part: int) -> str:
+    """Return the name of one of the numbers that the quantity is."""
+    extras = extras_of(race)
+    places = np.unravel_index(part, [race.sizes[dim] for dim in extras])
+    named = {dim: str(race[dim].values[i]) for dim, i in zip(extras, places, strict=True)}
+    return ", ".join(
+        parameter_label(value) if dim == "parameter" else f"{dim} {value}" for dim, value in named.items()
+    )
+
+
+def _columns(race: xr.Dataset) -> list[str]:
+    return ["contender", *(f"{budget:,}" for budget in budgets_of(race))]
+
+
+def interval_table(race: xr.Dataset) -> Table:
+    """Return how many intervals hold the reference, with limits; no rows where no contender has any."""
+    share, low, high = (values(race, "coverage", end) for end in ("", "_low", "_high"))
+    levels = {level_of(race, name) for name in names_of(race)}
+    rows = []
+    for i, name in enumerate(names_of(race)):
+        cells = [
+            MISSING
+            if np.isnan(share[i, j])
+            else f"{percent(share[i, j])}\n{100 * low[i, j]:.1f} to {100 * high[i, j]:.1f}"
+            for j in range(race.sizes["budget"])
+        ]
+        label = name if len(levels) == 1 else f"{name} ({100 * level_of(race, name):g}\u00a0%)"
+        rows.append([label, *cells])
+    stated = f" (stated: {100 * levels.pop():g} %)" if len(levels) == 1 else " (stated: in brackets)"
+    title = f"Intervals: share that holds the reference{stated}, by budget of evaluations"
+    return Table(title, _columns(race), rows if np.isfinite(share).any() else [])
+
+
+def interval_words(race: xr.Dataset) -> str:
+    """Return whose intervals are too narrow, whose conservative, who gives none, as far as limits tell."""
+    share, low, high = (values(race, "coverage", end) for end in ("", "_low", "_high"))
+    told, ran = np.isfinite(share), values(race, "evaluations") > 0
+    said: dict[str, list[str]] = {"too narrow": [], "conservative": []}
+    for i, name in enumerate(names_of(race)):
+        level = level_of(race, name)
+        narrow = told[i] & (high[i] < level) & (1 - share[i] > NARROW * (1 - level))
+        wide = told[i] & (low[i] > level) & (1 - share[i] < WIDE * (1 - level))
+        for text, flags in zip(said, (narrow, wide), strict=True):
+            if flags.any():
+                found = span([f"{100 * value:.0f}" for value in sorted(share[i, flags])])
+                where = at_budgets(race, flags, told[i])
+                said[text].append(f"{name} {where} ({found} %, stated {100 * level:g} %)")
+    parts = [f"{text}: {', '.join(who)}" for text, who in said.items() if who]
+    if not parts and told.any():
+        parts = ["are not seen to be too narrow or conservative"]
+    none = [name for i, name in enumerate(names_of(race)) if ran[i].any() and not told[i].any()]
+    if none and told.any():
+        parts.append(f"{listed(none)} {'gives' if len(none) == 1 else 'give'} none")
+    return f"Intervals {'; '.join(parts)}" if parts else "Intervals: no contender gives any"
