@@ -43,12 +43,53 @@ def wilson(hits: Array, n: Array, confidence: float) -> tuple[Array, Array]:
     z = ndtri(0.5 + confidence / 2)
     draws = np.maximum(n, 1.0)
     share = np.where(n > 0, hits / draws, 0.5)
-    centre = (share + z**2 / (2 * draws)) / (1 + z**2 / draws)
-    half = z * np.sqrt(share * (1 - share) / draws + z**2 / (4 * draws**2)) / (1 + z**2 / draws)
+    centre, half = _score(share, draws, z)
     # Rounding must not leave the estimate outside at 0 and 1.
     low = np.where(hits <= 0, 0.0, np.clip(centre - half, 0.0, share))
     high = np.where(hits >= n, 1.0, np.clip(centre + half, share, 1.0))
     return np.where(n > 0, low, 0.0), np.where(n > 0, high, 1.0)
+
+
+def replicated(
+    share: Array, squares: Array, replicates: int, n: Array, confidence: float
+) -> tuple[Array, Array]:
+    """Return the interval of a share from those of independent designs.
+
+    The score interval of as many draws as have the variance between replicates, with the t quantile, and half
+    a point more to either side, for a share of n points is a multiple of 1/n. A plain t interval forgets that
+    the variance depends on the share, and that even points leave replicates few different shares: of 8
+    replicates its 95 % limits hold in as little as 89 % (four random events in all) and 92 % (even points in
+    one dimension), these in 95 % and 93 %.
+
+    Parameters
+    ----------
+    share : array
+        Mean over the replicates.
+    squares : array
+        Sum of squared deviations of the replicates from it; where it is 0 there is no such interval.
+    replicates : int
+    n : array
+        Points of all replicates together.
+    confidence : float
+
+    Returns
+    -------
+    low, high : array
+        NaN where the replicates do not differ.
+    """
+    freedom = replicates - 1
+    differ = squares > 0
+    draws = np.where(differ, share * (1 - share) * freedom * replicates, 1.0) / np.where(differ, squares, 1.0)
+    centre, half = _score(share, draws, float(stdtrit(freedom, 0.5 + confidence / 2)))
+    reach = np.where(differ, half + 0.5 / np.maximum(n, 1.0), np.nan)
+    return np.minimum(centre - reach, share), np.maximum(centre + reach, share)
+
+
+def _score(share: Array, draws: Array, z: float) -> tuple[Array, Array]:
+    """Return centre and half width of the score interval."""
+    centre = (share + z**2 / (2 * draws)) / (1 + z**2 / draws)
+    half = z * np.sqrt(share * (1 - share) / draws + z**2 / (4 * draws**2)) / (1 + z**2 / draws)
+    return centre, half
 
 
 def student(mean: Array, squares: Array, n: Array, confidence: float) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hipuq.estimation.reduction import Moments
 from hipuq.estimation.results import Kind
-from hipuq.intervals import student, wilson
+from hipuq.intervals import replicated, student, wilson
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,8 @@ def columns(cells: Moments, bounds: list[Moments], kind: Kind, confidence: float
 def _limit(cells: Moments, kind: Kind, confidence: float) -> tuple[Array, Array]:
     """Return the limits between replicates, or those of the pooled draws where replicates agree."""
     pooled = cells.pooled()
-    if kind.quantity == "probability" and not kind.graded:
+    shares = kind.quantity == "probability" and not kind.graded
+    if shares:
         single = wilson(pooled.total, pooled.known, confidence)
     else:
         single = student(pooled.mean, pooled.squares, pooled.known, confidence)
@@ -66,7 +67,10 @@ def _limit(cells: Moments, kind: Kind, confidence: float) -> tuple[Array, Array]
         return single
     mean = cells.mean.mean(axis=1)
     squares = np.square(cells.mean - mean[:, None]).sum(axis=1)
-    between = student(mean, squares, np.full_like(mean, replicates), confidence)
+    if shares:
+        between = replicated(mean, squares, replicates, pooled.known, confidence)
+    else:
+        between = student(mean, squares, np.full_like(mean, replicates), confidence)
     agree = squares == 0
     low, high = (np.where(agree, a, b) for a, b in zip(single, between, strict=True))
     return low, high
