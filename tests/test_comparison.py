@@ -247,6 +247,14 @@ def test_friction_integrated_takes_part():
     assert float(error.loc[{"method": "integrated"}]) < float(error.loc[{"method": "sampled"}])
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "exact"), [(0.5, 0.5, True), (0.5 - 1e-14, 0.5, True), (0.5, 0.6, False)]
+)
+def test_limits_that_are_rounding_make_an_exact_reference(low, high, exact):
+    results = xr.Dataset({"probability": 0.5, "probability_low": low, "probability_high": high})
+    assert reference_from(results).exact == exact
+
+
 def test_limits_of_a_reference_must_hold_it():
     with pytest.raises(hipuq.HipuqError, match="do not hold its value"):
         Reference(0.5, 0.6, 0.7)

@@ -130,6 +130,21 @@ def test_few_replicates_take_more_to_tell_a_bias():
     assert rows(bias_table(many))["random"] == [["+3.5", "biased"]]
 
 
+def test_the_same_few_events_each_time_are_no_bias():
+    """Estimates that agree by chance have intervals that hold the answer."""
+    made = compared({"random": spread(0.0, bias=0.01)}, budgets=[64], replicates=12)
+    assert rows(bias_table(made))["random"] == [["each time off", "biased"]]
+    wide = made.assign(low=made["low"] - 0.1, high=made["high"] + 0.1)
+    assert rows(bias_table(wide))["random"] == [["each time off"]]
+
+
+def test_nobody_is_called_biased_by_fewer_than_ten_replicates():
+    made = compared({"random": spread(0.5, bias=5.0)}, budgets=[64], replicates=9)
+    assert float(made["bias"][0, 0]) > 100 * float(made["bias_error"][0, 0])
+    assert bias_words(made) == ""
+    assert bias_table(made).note == "with fewer than 10 replicates nobody is called biased"
+
+
 def test_the_limits_of_a_reference_leave_a_bias_open():
     made = compared({"random": spread(0.5, bias=0.1)}, limits=0.12)
     assert [cell[1] for cell in rows(bias_table(made))["random"]] == ["biased?"] * 3

@@ -30,6 +30,9 @@ from hipuq.report.table import MISSING, Table, percent, significant, with_unit
 SIGMAS = 3.0
 """Standard errors beyond which a mean error is no accident, where replicates are many."""
 
+FEWEST = 10
+"""Replicates from which on a mean error is judged: with fewer their scatter itself is hardly known."""
+
 NARROW = 1.6
 """Shares of misses, over the stated one, above which intervals are called too narrow: 8 % for 5 %."""
 
@@ -121,6 +124,8 @@ def bias_table(race: xr.Dataset) -> Table:
     if parts := parts_of(race):
         title += f"; of the {parts} that which is farthest off"
     note = f"biased: beyond {_bar(race)} standard errors" if flags.any() else ""
+    if (values(race, "replicates").max() < FEWEST) and not note:
+        note = f"with fewer than {FEWEST} replicates nobody is called biased"
     if (flags & open_).any():
         note += "; biased?: the limits of the reference hold the mean estimate"
     return Table(title, _columns(race), rows, note)
@@ -155,7 +160,21 @@ def _standardised(race: xr.Dataset) -> tuple[Array, np.ndarray, Flags, Flags]:
     far, off = (np.take_along_axis(part, where[..., None], 2)[..., 0] for part in (over, bias))
     truth, low, high = (race[f"reference{end}"].values.ravel()[where] for end in ("", "_low", "_high"))
     open_ = (low < high) & (low <= truth + off) & (truth + off <= high)
-    return far, where, np.abs(far) > _bars(race), open_
+    # The same few events each time are chance, as long as an interval of its own holds the answer.
+    chance = np.isinf(far) & np.take_along_axis(_holding(race), where[..., None], 2)[..., 0]
+    judged = (values(race, "replicates") >= FEWEST) & ~chance
+    return far, where, (np.abs(far) > _bars(race)) & judged, open_
+
+
+def _holding(race: xr.Dataset) -> Flags:
+    """Return whether any interval of a contender holds the reference, (m, b, parts)."""
+    runs = (race.sizes["method"], race.sizes["budget"], -1, race.sizes["replicate"])
+    low, high = (
+        race[end].transpose("method", "budget", *extras_of(race), "replicate").values.reshape(runs)
+        for end in ("low", "high")
+    )
+    answer = race["reference"].values.reshape(-1, 1)
+    return np.asarray(((low <= answer) & (answer <= high)).any(axis=3), bool)
 
 
 def _bars(race: xr.Dataset) -> Array:
