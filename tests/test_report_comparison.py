@@ -340,3 +340,15 @@ def test_numbers_as_text():
         "16",
         "2,800",
     ]
+
+
+def test_errors_by_parameter_are_of_a_budget_that_all_take():
+    truth = {"friction": 0.4, "k1": 0.1}
+    entries = {"chaos": {"budgets": [64, 256]}}
+    made = compared({"sobol": spread(), "chaos": spread(0.2)}, truth, entries=entries, dims=("parameter",))
+    table = parameter_table(made)
+    assert table.title == "Error by parameter at 256 evaluations"
+    for i, row in enumerate(table.rows):
+        for j, cell in enumerate(row[2:]):
+            error = float(made["rmse"].isel(method=j, budget=1, parameter=i))
+            assert float(cell.removesuffix(" *")) == pytest.approx(error, rel=5e-3)

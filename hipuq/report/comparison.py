@@ -139,12 +139,14 @@ def _options(entry: Mapping[str, Any]) -> str:
 
 
 def parameter_table(race: xr.Dataset) -> Table:
-    """Return the error of each parameter at the largest budget; no rows of other quantities."""
-    title = f"Error by parameter at {budgets_of(race)[-1]:,} evaluations"
+    """Return the error of each parameter at the largest budget that all take; no rows of other quantities."""
+    together = np.flatnonzero((values(race, "evaluations") > 0).all(axis=0))
+    place = int(together[-1]) if together.size else race.sizes["budget"] - 1
+    title = f"Error by parameter at {budgets_of(race)[place]:,} evaluations"
     columns = ["parameter", "reference", *names_of(race)]
     if extras_of(race) != ("parameter",):
         return Table(title, columns, [])
-    rmse = race["rmse"].isel(budget=-1).transpose("method", "parameter").values
+    rmse = race["rmse"].isel(budget=place).transpose("method", "parameter").values
     starred = np.where(lowest(race, rmse), f" {BEST}", "")
     rows = []
     for i, name in enumerate(race["parameter"].values):
