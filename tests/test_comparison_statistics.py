@@ -83,9 +83,28 @@ def test_over_other_dims():
     assert found["rmse_overall"][0, 0] == pytest.approx(np.sqrt(10 / 4))
     assert found["coverage"][0, 0].tolist() == [0.5, 0.5]
     assert found["coverage_overall"][0, 0] == 0.5
-    # of as many trials as runs, not as numbers
+    # runs agree: of as many trials as runs, not as numbers
     assert found["coverage_overall_low"][0, 0] == pytest.approx(wilson(np.array(1.0), np.array(2.0), 0.95)[0])
     assert set(np.round(resampled.ravel() ** 2 * 4)) <= {2.0, 10.0, 18.0}
+
+
+def test_coverage_over_other_dims_has_the_scatter_of_the_runs():
+    """Runs of 40 intervals each that hold together or not at all are 30 trials; independent ones are 1200."""
+    rng = np.random.default_rng(1)
+    width = {}
+    for name, shape in (("together", (30, 1)), ("apart", (30, 40))):
+        held = np.broadcast_to(rng.uniform(size=shape) < 0.9, (30, 40))
+        low = np.where(held, -1.0, 1.0)[None, None]
+        given = cells(np.zeros((1, 1, 30, 40)), low=low, high=low + 2.0, reference=np.zeros(40))
+        found, _ = errors(given, stream, 0.95)
+        share, *ends = (float(found[f"coverage_overall{end}"][0, 0]) for end in ("", "_low", "_high"))
+        assert share == pytest.approx(held.mean())
+        assert ends[0] < 0.9 < ends[1]
+        width[name] = ends[1] - ends[0]
+        if name == "together":
+            trials = np.ptp(wilson(np.array(30 * share), np.array(30.0), 0.95))
+    assert width["together"] == pytest.approx(trials, rel=0.1)
+    assert width["apart"] == pytest.approx(2 * 1.96 * np.sqrt(0.09 / 1200), rel=0.3)
 
 
 def test_what_was_not_run_is_unknown():

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.intervals import wilson
+from hipuq.intervals import replicated, wilson
 
 Array = NDArray[np.float64]
 
@@ -100,9 +100,7 @@ def errors(
         hits, told = _held(cells, i, j, count)
         found["coverage"][i, j], *limits = _share(hits.sum(axis=0), told.sum(axis=0), level)
         found["coverage_low"][i, j], found["coverage_high"][i, j] = limits
-        # Results of one run hang together: no more trials than runs.
-        every = max(hits[0].size, 1)
-        middle, *limits = _share(hits.sum() / every, told.sum() / every, level)
+        middle, *limits = _share_over_runs(hits.reshape(count, -1), told.reshape(count, -1), level)
         overall["coverage_overall"][i, j] = middle
         overall["coverage_overall_low"][i, j], overall["coverage_overall_high"][i, j] = limits
     return found | (overall if extra else {}), resampled
@@ -126,6 +124,22 @@ def _share(hits: Array, n: Array, level: float) -> tuple[Array, Array, Array]:
     middle = np.divide(hits, n, out=np.full_like(hits, np.nan), where=n > 0)
     low, high = wilson(hits, n, level)
     return middle, np.where(n > 0, low, np.nan), np.where(n > 0, high, np.nan)
+
+
+def _share_over_runs(hits: Array, n: Array, level: float) -> tuple[Array, Array, Array]:
+    """Return the share of hits (runs, results) with limits from the scatter of the runs.
+
+    Results of one run hang together, so that runs that agree count as one trial each.
+    """
+    hits, n = hits[n.sum(axis=1) > 0], n[n.sum(axis=1) > 0]
+    runs = len(n)
+    each = hits.sum(axis=1) / n.sum(axis=1)
+    middle = each.mean() if runs else np.array(np.nan)
+    squares = np.square(each - middle).sum()
+    if runs < 2 or squares <= ROUNDING:
+        return _share(middle * runs if runs else np.array(0.0), np.array(float(runs)), level)
+    low, high = replicated(middle, squares, runs, n.sum(), level)
+    return middle, np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
 
 
 def ranks(rmse: Array, resampled: Array, level: float) -> dict[str, Array]:
