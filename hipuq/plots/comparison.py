@@ -73,8 +73,9 @@ def error_over_cost(
         Both axes are logarithmic; that of the error is broken where three decades or more hold nothing.
         Over evaluations, points of methods stand side by side, near their number.
         An error of 0, or one that is rounding, has no place on it: the legend names the method and says
-        so. Thin dashed lines are theoretical slopes through the first point of the baseline. A dotted
-        line is the standard error of a reference that is not exact: smaller errors cannot be told.
+        so. Thin dashed lines are theoretical slopes through the first point of the baseline, over time
+        through its last one. A dotted line is the standard error of a reference that is not exact: smaller
+        errors cannot be told.
 
     Raises
     ------
@@ -104,7 +105,8 @@ def error_over_cost(
         label = method_label(race, method, note or ("" if drawn[i].any() else UNDEFINED))
         curve(ax, i, x[i], np.where(drawn[i], error[i], np.nan), label, (low[i], high[i]))
     if drawn.any():
-        i, j = _anchor(race, drawn)
+        # A small run takes as long as no run: time goes with n only in the largest.
+        i, j = _anchor(race, drawn, last=cost == "seconds")
         _slopes(ax, (float(x[i, j]), float(error[i, j])), SLOPES[cost], parts)
     else:
         say(ax, "every error is 0: none on a logarithmic axis" if exact.any() else UNDEFINED)
@@ -233,12 +235,12 @@ def _new(ax: Axes | None, race: xr.Dataset) -> Axes:
     return new_axes(ax, 6.4, 4.4 + 0.17 * max(0, (len(names_of(race)) - 3) // 2))
 
 
-def _anchor(race: xr.Dataset, drawn: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return method and budget of the first point of the baseline; of another method if it has none."""
+def _anchor(race: xr.Dataset, drawn: NDArray[np.bool_], *, last: bool) -> tuple[int, int]:
+    """Return method and budget of an end point of the baseline; of another method if it has none."""
     names, baseline = names_of(race), baseline_of(race)
     ranked = sorted(range(len(names)), key=lambda i: names[i] != baseline)
     i = next(i for i in ranked if drawn[i].any())
-    return i, int(drawn[i].argmax())
+    return i, int(np.flatnonzero(drawn[i])[-1 if last else 0])
 
 
 def _set_x(ax: Axes, x: Array, *, count: bool) -> None:
