@@ -40,12 +40,15 @@ def run(
         bool, typer.Option("--resume", help="Go on from what an earlier run left in the output folder.")
     ] = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Check the study and count evaluations, nothing else.")
+        bool,
+        typer.Option(
+            "--dry-run", help="Check the study, with --resume its output too, and count evaluations."
+        ),
     ] = False,
 ) -> None:
     """Run a study: outcomes, results.nc, figures and report.html."""
     from hipuq.sampling import check_count
-    from hipuq.study import load_study, run_study
+    from hipuq.study import load_study, run_study, would_keep
 
     if jobs is not None:
         check_count("--jobs", jobs)
@@ -64,9 +67,11 @@ def run(
             f"{budgets} evaluations, {race.replicates:,} replicates, {problem.evaluations:,} evaluations"
         )
     typer.echo(f"  in all {plan.evaluations:,} evaluations")
-    if dry_run:
-        return
     folder = out if out is not None else Path("results") / plan.name
+    if dry_run:
+        for line in would_keep(plan, folder) if resume else ():
+            typer.echo(f"  {line}")
+        return
     try:
         tree = run_study(plan, folder, resume=resume, n_jobs=jobs, say=typer.echo)
     except KeyboardInterrupt:

@@ -103,9 +103,20 @@ def compared(
                 spent = how["per"] * n
                 whole = how["beside"] + spent * 1.1
                 parts = (part.tolist() for part in (estimate, estimate - half, estimate + half))
-                record.add(Run(one.name, budget, k, one.sizes[budget], n, whole, spent, *parts))
+                record.add(Run(one.name, budget, k, one.sizes[budget], n, whole, spent, 1, *parts))
     reference = np.stack([value, *(value if end is None else end for end in ends)])
     return dataset(race, record, reference, 7).assign_attrs(title=title)
+
+
+def integrated():
+    """Return what is said of a contender whose model has the friction integrated."""
+    model = hipuq.models.two_dof()
+    return {
+        "method": "monte_carlo",
+        "model": hipuq.integrate_friction(model, cp.Uniform(0.0, 0.5)),
+        "inputs": model.inputs(k1=hipuq.relative(cp.Uniform(-0.1, 0.1))),
+        "of": "probability",
+    }
 
 
 def with_comparisons(tree, **races):

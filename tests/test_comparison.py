@@ -260,6 +260,32 @@ def test_limits_of_a_reference_must_hold_it():
         Reference(0.5, 0.6, 0.7)
     with pytest.raises(hipuq.HipuqError, match="other shapes"):
         Reference([0.5, 0.6], 0.4, 0.7)
+    with pytest.raises(hipuq.HipuqError, match="one limit"):
+        Reference(0.5, low=0.4)
+    with pytest.raises(hipuq.HipuqError, match="probability of the reference has no limits"):
+        reference_from(xr.Dataset({"probability": 0.5}))
+
+
+def test_a_numpy_number_is_an_option_like_any_other():
+    contender = {"method": "chaos", "options": {"degree": np.int64(2)}}
+    found = compare(
+        smooth, INPUTS, {"a": contender}, of="y", reference=0.5, budgets=[64], replicates=2, rng=0
+    )
+    assert '"degree": 2' in found.attrs["options"]
+
+
+def test_models_are_the_same_only_if_they_say_so():
+    """Two functions of one name are two models: nothing is saved by one in evaluations of the other."""
+
+    def other(samples):
+        return smooth(samples)
+
+    other.__qualname__ = smooth.__qualname__
+    contenders = {"random": {"method": "monte_carlo"}, "other": {"method": "monte_carlo", "model": other}}
+    found = compare(smooth, INPUTS, contenders, of="y", reference=0.5, budgets=[64], replicates=3, rng=0)
+    assert np.isnan(found["break_even"]).all()
+    assert np.isfinite(found["cost_ratio"]).all()
+    assert found.attrs["jobs"].isdecimal()
 
 
 @pytest.mark.parametrize(
@@ -285,6 +311,18 @@ def test_limits_of_a_reference_must_hold_it():
         ({"contenders": {"a": {"method": "monte_carlo", "budgets": [32]}}}, "budget 32 of 'a' is none"),
         ({"contenders": {"a": {"method": "monte_carlo", "replicates": 3}}}, "the comparison has 2"),
         ({"contenders": {"a": {"method": "monte_carlo", "quantity": "S1"}}}, "'a' have no 'S1'"),
+        ({"contenders": {1: {"method": "monte_carlo"}}}, "the name of a contender is 1"),
+        ({"contenders": {"a\nb": {"method": "monte_carlo"}}}, "characters in a line"),
+        ({"contenders": {"": {"method": "monte_carlo"}}}, "the name of a contender is ''"),
+        ({"contenders": {"a": {"method": "chaos", "options": {"degree": {1}}}}}, "plain numbers"),
+        ({"contenders": {"plumless": CONTENDERS["chaos"], "buckeroo": CONTENDERS["chaos"]}}, "same samples"),
+        (
+            {"budgets": [64, 10**20], "contenders": {"a": {**CONTENDERS["chaos"], "budgets": [64]}}},
+            "no contender",
+        ),
+        ({"store": 5}, "store is 5"),
+        ({"store": "runs", "resume": True}, "has no label and options"),
+        ({"n_jobs": 0}, "n_jobs is 0"),
         ({"baseline": "a"}, "unknown baseline 'a'"),
         ({"reference": {"a": 1.0}}, "the reference over"),
         ({"reference": "x"}, "it must be a number"),

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from hipuq.comparison.statistics import Cells, costs, errors, ranks, rates
+from hipuq.comparison.costs import costs
+from hipuq.comparison.statistics import Cells, errors, ranks, rates
 from hipuq.intervals import wilson
 
 
@@ -61,6 +62,7 @@ def test_coverage_counts_intervals():
     given = cells([[[1.0, 2.0, 3.5, 2.0]]], low=low, high=high, reference=2.0)
     found, _ = errors(given, stream, 0.95)
     assert found["coverage"][0, 0] == pytest.approx(2 / 3)
+    assert found["intervals"].tolist() == [[3]]
     both = wilson(np.array(2.0), np.array(3.0), 0.95)
     np.testing.assert_allclose([found["coverage_low"][0, 0], found["coverage_high"][0, 0]], both)
 
@@ -150,6 +152,11 @@ def test_rates_are_slopes():
     assert np.isnan(zero["rate"]).all()
 
 
+def spread(rmse):
+    """Return resampled errors: those of all contenders within 10 %, each by itself."""
+    return rmse * np.random.default_rng(2).uniform(0.9, 1.1, (1000, *rmse.shape))
+
+
 def test_costs_by_hand():
     """Plain runs: 1 ms and 10 us for each evaluation, 4 us of it the model; error 1 at 100 evaluations."""
     n = np.array([[100, 400], [50, 100], [100, 400], [10, 10]])
@@ -163,7 +170,7 @@ def test_costs_by_hand():
         seconds=np.repeat(whole[:, :, None], 3, 2),
         model=np.repeat(model[:, :, None], 3, 2),
     )
-    found = costs(given, rmse, 0, [True, True, True, False])
+    found = costs(given, rmse, spread(rmse), 0, [True, True, True, False], 0.9)
     np.testing.assert_allclose(found["run_time"][0], whole[0])
     np.testing.assert_allclose(found["baseline_evaluations"][0], [100, 400])
     np.testing.assert_allclose(found["cost_ratio"][0], [1.0, 1.0])
@@ -181,6 +188,35 @@ def test_costs_by_hand():
     assert found["baseline_evaluations"][3, 0] == np.inf
     assert found["cost_ratio"][3, 0] == 0.0
     assert np.isnan(found["cost_ratio"][3, 1])
+    # limits of the ratio of two uniform errors squared, each within 10 %
+    low, high = found["baseline_evaluations_low"], found["baseline_evaluations_high"]
+    assert low[0].tolist() == high[0].tolist() == [100, 400]
+    assert 1600 * 0.9**2 / 1.1**2 < low[1, 0] < 1500 < 1700 < high[1, 0] < 1600 * 1.1**2 / 0.9**2
+    assert low[3, 0] == np.inf
+
+
+def test_times_of_the_baseline_are_carried_on_below_and_beyond():
+    """1 ms and 10 us for each evaluation, for an error above that of the smallest run and one below all."""
+    n = np.array([[100, 400], [100, 400]])
+    whole = np.array([1e-3 + 1e-5 * n[0], [1e-3, 1e-3]])
+    rmse = np.array([[1.0, 0.5], [2.0, 0.1]])
+    estimate = np.broadcast_to(rmse[:, :, None], (2, 2, 2)).copy()
+    given = cells(estimate, evaluations=n, seconds=np.repeat(whole[:, :, None], 2, 2), model=0.0)
+    found = costs(given, rmse, spread(rmse), 0, [True, True], 0.9)
+    np.testing.assert_allclose(found["baseline_evaluations"][1], [25, 10_000])
+    np.testing.assert_allclose(found["cost_ratio"][1], [1e-3 / 1.25e-3, 1e-3 / 0.101])
+
+
+def test_times_of_a_baseline_without_an_error_count():
+    """Its error is unknown with 100 evaluations, its time is not."""
+    n = np.array([[100, 400], [100, 400]])
+    rmse = np.array([[np.nan, 0.5], [1.0, 0.5]])
+    estimate = np.ones((2, 2, 2))
+    whole = np.repeat(np.array([[1e-3, 4e-3], [1e-3, 4e-3]])[:, :, None], 2, 2)
+    given = cells(estimate, evaluations=n, seconds=whole, model=0.0)
+    found = costs(given, rmse, spread(rmse), 0, [True, True], 0.9)
+    np.testing.assert_allclose(found["cost_ratio"][1], [1.0, 1.0])
+    assert np.isnan(found["baseline_evaluations"][0, 0])
 
 
 def test_a_surrogate_pays_where_the_model_is_slow():
@@ -195,7 +231,7 @@ def test_a_surrogate_pays_where_the_model_is_slow():
         seconds=np.repeat(whole[:, :, None], 2, 2),
         model=np.repeat(model[:, :, None], 2, 2),
     )
-    found = costs(given, rmse, 0, [True, True])
+    found = costs(given, rmse, spread(rmse), 0, [True, True], 0.9)
     # saves 300 evaluations and their 0.4 ms for 200 ms; then 1200 and 1.6 ms
     np.testing.assert_allclose(found["break_even"][1], [(0.2 - 4e-4) / 300, (0.2 - 1.6e-3) / 1200])
     np.testing.assert_allclose(found["cost_ratio"][1], whole[1] / (8e-4, 3.2e-3))

@@ -109,6 +109,21 @@ def test_replicates_that_agree_fall_back_to_the_pooled_interval():
     assert triple(results) == pytest.approx([0.25, low, high])
 
 
+@pytest.mark.parametrize("replicates", [3, 5, 7, 8, 10])
+@pytest.mark.parametrize("modes", [0, 3])
+def test_rounding_is_no_scatter_of_replicates(replicates, modes):
+    """The mean of equal shares of 1/10 is not 1/10 to the last bit; limits are those of the pooled sample."""
+    n = 10 * replicates
+    values = np.tile([1.0] + [0.0] * 9, replicates)
+    dims = ("sample", "mode") if modes else ("sample",)
+    values = np.repeat(values[:, None], modes, axis=1) if modes else values
+    replicate = {"replicate": ("sample", np.repeat(np.arange(1, replicates + 1), 10))}
+    results = estimated(values, dims=dims, coords=replicate, role="verdict")
+    expected = stats.binomtest(replicates, n).proportion_ci(method="wilson")
+    for end in ("low", "high"):
+        np.testing.assert_allclose(results[f"probability_{end}"], getattr(expected, end), rtol=1e-9)
+
+
 def test_outcomes_over_modes_are_estimated_mode_by_mode():
     values = np.array([[0, 1, np.nan], [0, 1, 1.0], [1, 1, np.nan]])
     results = estimated(values, dims=("sample", "mode"), coords={"mode": [1, 2, 3]}, role="verdict")

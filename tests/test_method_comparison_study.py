@@ -1,5 +1,6 @@
 """The comparison of methods with few replicates: all its problems, their known answers, report."""
 
+import io
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from rich.console import Console
 import hipuq
 from hipuq.report.page import write_report
 from hipuq.report.text import show_results
+from hipuq.study import Study
 
 STUDY = Path(__file__).parents[1] / "studies" / "method_comparison"
 
@@ -18,7 +20,7 @@ PROBLEMS = ("hoffmann", "hulten", "hoffmann_ST", "oberst2016", "ring", "ring_S1"
 
 
 @pytest.fixture(scope="module")
-def whole() -> hipuq.study.Study:
+def whole() -> Study:
     return hipuq.load_study(STUDY)
 
 
@@ -87,7 +89,7 @@ def test_patterns_have_their_own_errors(results):
 def test_report_and_screen_tell_of_each_problem(results):
     tree, out = results
     page = (out / "report.html").read_text()
-    console = Console(width=100, record=True, file=(out / "shown").open("w"))
+    console = Console(width=100, record=True, file=io.StringIO())
     show_results(tree, console)
     shown = console.export_text()
     for problem in PROBLEMS:

@@ -11,8 +11,9 @@ from rich.console import Console
 
 import hipuq
 from hipuq.report.comparison import facts, summary, tables
-from hipuq.report.comparison_cost import cost_summary, time_table, winner_table
+from hipuq.report.comparison_cost import cost_summary
 from hipuq.report.comparison_error import error_table
+from hipuq.report.comparison_winner import time_table, winner_table
 from hipuq.report.figures import pictures
 from hipuq.report.page import content, write_report
 from hipuq.report.summary import analyses, comparisons

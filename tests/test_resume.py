@@ -25,6 +25,9 @@ TIMES = (
 )
 """What no two runs have in common."""
 
+REHEARSALS = 4
+"""Calls of the model before the first analysis: each contender's first, but for those that integrate."""
+
 
 class Killed(BaseException):
     """In place of a signal."""
@@ -86,7 +89,7 @@ def test_a_run_that_was_killed_goes_on_to_the_same_results(whole, tmp_path, call
     """At any place: in the first analysis, between two, at the first or a later run of a comparison."""
     folder = tmp_path / "study"
     with pytest.MonkeyPatch.context() as patched, pytest.raises(Killed):
-        kill_after(patched, calls)
+        kill_after(patched, REHEARSALS + calls)
         run(folder, BOTH)
     said: list[str] = []
     assert_same(run(folder, BOTH, resume=True, say=said.append), whole)
@@ -103,7 +106,7 @@ def test_nothing_is_evaluated_twice(monkeypatch, tmp_path):
     assert calls > 20
     said: list[str] = []
     again = run(folder, BOTH, resume=True, say=said.append)
-    assert counted[0] == calls
+    assert counted[0] == calls + REHEARSALS
     assert [line.split(",")[0] for line in said[2:]] == [
         f"compare/{name}: complete" for name in ("hoffmann", "indices", "onset")
     ]
@@ -235,7 +238,7 @@ def test_without_resume_all_is_made_anew(monkeypatch, tmp_path):
     folder = tmp_path / "study"
     run(folder, BOTH)
     with monkeypatch.context() as patched, pytest.raises(Killed):
-        kill_after(patched, 1)
+        kill_after(patched, REHEARSALS + 1)
         run(folder, BOTH, seed=9)
     assert list(hipuq.load_results(folder / "out").children) == ["a"]
     assert not list((folder / "out" / "compare").iterdir())
@@ -283,6 +286,134 @@ def test_the_command_says_how_to_go_on(monkeypatch, capsys, tmp_path):
     assert caught.value.code == 1
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert "was made with seed" in line
+
+
+def test_a_resume_that_fails_leaves_no_less_than_there_was(tmp_path):
+    """Old results of a comparison stay until there are new ones; what the study no longer has is told."""
+    folder = tmp_path / "study"
+    first = run(folder, BOTH)
+    more = BOTH.replace("budgets = [16, 32]", "budgets = [16, 32, 128]")
+    with pytest.MonkeyPatch.context() as patched, pytest.raises(Killed):
+        kill_after(patched, REHEARSALS)
+        run(folder, more, resume=True)
+    stored = hipuq.load_results(folder / "out")
+    assert stored.groups == first.groups
+    xr.testing.assert_identical(stored["compare"], first["compare"])
+    # The first problem is complete, the next ones are not.
+    with pytest.MonkeyPatch.context() as patched, pytest.raises(Killed):
+        kill_after(patched, REHEARSALS + 2 + 2 * 3 + 1)
+        run(folder, more, resume=True)
+    stored = hipuq.load_results(folder / "out")
+    assert stored["compare/hoffmann"]["budget"].values.tolist() == [16, 32, 128]
+    assert stored["compare/onset"]["budget"].values.tolist() == [16, 32]
+    said: list[str] = []
+    last = run(folder, more, resume=True, say=said.append)
+    assert last["compare/onset"]["budget"].values.tolist() == [16, 32, 128]
+    assert not [line for line in said if ": dropped from" in line]
+    assert_same(hipuq.load_results(folder / "out"), last)
+
+
+def test_what_is_dropped_is_told(tmp_path):
+    folder = tmp_path / "study"
+    head, *_, last = BOTH.split("[[compare.problem]]")
+    text = f"{BOTH}[report]\nfriction_sweep = [0.0, 0.8]\nfriction_points = 11\n"
+    run(folder, text)
+    said: list[str] = []
+    less = head + "[[compare.problem]]" + last[: last.index('[[analysis]]\nname = "b"')]
+    found = run(folder, less, resume=True, say=said.append)
+    file = folder / "out" / "results.nc"
+    assert [line for line in said if ": dropped from" in line] == [
+        f"{name}: dropped from {file}, the study no longer has it"
+        for name in ("b", "a/friction_sweep", "compare/hoffmann", "compare/indices")
+    ]
+    assert list(found.children) == ["a", "compare"]
+    assert list(found["compare"].children) == ["onset"]
+
+
+def test_results_of_another_seed_are_not_carried_over(tmp_path):
+    """Without the runs nothing else says that they are."""
+    folder = tmp_path / "study"
+    run(folder, COMPARE)
+    for file in (folder / "out" / "compare").iterdir():
+        file.unlink()
+    said: list[str] = []
+    with pytest.MonkeyPatch.context() as patched, pytest.raises(Killed):
+        kill_after(patched, REHEARSALS + 4)
+        run(folder, COMPARE, seed=9, resume=True, say=said.append)
+    assert any(line.endswith("results.nc, it was made with another seed") for line in said)
+
+
+def test_what_no_result_has_shows_before_the_first_analysis(tmp_path):
+    folder = tmp_path / "study"
+    said: list[str] = []
+    for old, new, message in (
+        ('quantity = "ST"', 'quantity = "STT"', r"problem 'indices': .*'sobol' have no 'STT'"),
+        ('of = "margin"\nquantity = "ST"\n', 'of = "margin"\nquantity = "mean"\n', "problem 'indices': "),
+    ):
+        assert old in BOTH
+        text = BOTH.replace(old, new, 1)
+        with pytest.raises(hipuq.HipuqError, match=message) as caught:
+            run(folder, text, say=said.append)
+        assert "\n" not in str(caught.value)
+        assert not said
+        assert not (folder / "out" / "results.nc").exists()
+
+
+def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
+    """Return exit code, standard output and standard error of a call."""
+    monkeypatch.setattr(sys, "argv", ["hipuq", *map(str, arguments)])
+    with pytest.raises(SystemExit) as caught:
+        main()
+    said = capsys.readouterr()
+    code = caught.value.code
+    return (code if isinstance(code, int) else int(code is not None)), said.out, said.err
+
+
+def test_a_dry_run_tells_what_would_be_kept_and_refuses_what_a_run_refuses(monkeypatch, capsys, tmp_path):
+    folder = tmp_path / "study"
+    run(folder, BOTH)
+    out = folder / "out"
+    file = out / "compare" / "hoffmann.jsonl"
+    lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
+    file.write_text("".join(lines[:-2]), encoding="utf-8")
+    before = {path: path.read_bytes() for path in (out / "results.nc", file)}
+    dry = ("run", folder, "--out", out, "--resume", "--dry-run")
+    code, said, _ = call(monkeypatch, capsys, *dry)
+    assert code == 0
+    for line in (
+        f"  a: would be kept, complete in {out}",
+        f"  b: would be kept, complete in {out}",
+        "  compare/hoffmann: 12 of 14 runs would be kept",
+        "  compare/indices: 2 of 2 runs would be kept",
+        "  compare/onset: 6 of 6 runs would be kept",
+    ):
+        assert line in said.splitlines()
+    code, _, err = call(monkeypatch, capsys, *dry, "--seed", 6)
+    assert code == 1
+    assert "runs with seed" in err
+    write(folder, BOTH.replace("n = 24", "n = 48"))
+    code, _, err = call(monkeypatch, capsys, *dry)
+    assert code == 1
+    assert "was made with n 24, the study asks for 48" in err
+    write(folder, BOTH.replace('[[analysis]]\nname = "b"', '[[analysis]]\nname = "c"'))
+    code, said, _ = call(monkeypatch, capsys, *dry)
+    assert code == 0
+    assert "  b: would be dropped, the study no longer has it" in said.splitlines()
+    assert {path: path.read_bytes() for path in before} == before
+    code, said, _ = call(
+        monkeypatch, capsys, "run", folder, "--out", tmp_path / "none", "--resume", "--dry-run"
+    )
+    assert "compare/hoffmann: 0 of 14 runs would be kept" in said
+    assert not (tmp_path / "none").exists()
+
+
+def test_definitions_too_deep_to_read_are_refused(tmp_path):
+    folder = tmp_path / "study"
+    tree = run(folder, f'title = "Deep"\n{ANALYSES}')
+    tree.attrs["analyses"] = '{"a":' * 3000 + "1" + "}" * 3000
+    hipuq.save_results(tree, folder / "out" / "results.nc")
+    with pytest.raises(StoreError, match="does not say how it was made"):
+        run(folder, f'title = "Deep"\n{ANALYSES}', resume=True)
 
 
 @pytest.mark.parametrize(

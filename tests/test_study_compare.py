@@ -2,6 +2,7 @@
 
 import json
 import sys
+import warnings
 import zlib
 from pathlib import Path
 
@@ -273,6 +274,64 @@ def test_a_reference_that_is_not_one_of_this_problem_is_refused(known, tmp_path,
     assert message in str(caught.value)
     assert "problem 'hoffmann'" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+HOSTILE = [
+    ({"options": '{"model":' + "[" * 100_000 + "]" * 100_000 + "}"}, "does not say of which model"),
+    ({"options": '{"model":' + "[" * 500 + "]" * 500 + "}"}, "of another problem|does not say"),
+    ({"inputs": "{" * 100_000}, "does not say of which model"),
+    ({"probability": "many"}, "has a probability of type .*, not of real numbers"),
+    ({"probability": 0.5 + 0j}, "has a probability of type complex128, not of real numbers"),
+    ({"probability_low": "few"}, "has a probability_low of type .*, not of real numbers"),
+    ({"probability_high": True}, "has a probability_high of type .*, not of real numbers"),
+    ({"probability_high": [0.9, 0.9]}, "has a probability_high of another shape than probability"),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), HOSTILE)
+def test_results_that_are_no_reference_are_refused_in_a_line(ran, tmp_path, changes, message):
+    results = ran[1]["a/any_unstable"].to_dataset()
+    for name, value in changes.items():
+        if name in results:
+            results[name] = ("level", value) if isinstance(value, list) else value
+        else:
+            results.attrs[name] = value
+    tree = xr.DataTree.from_dict({"/": ran[1].to_dataset(), "a/any_unstable": results})
+    with warnings.catch_warnings():
+        # h5netcdf keeps complex numbers and booleans, but not gladly.
+        warnings.simplefilter("ignore")
+        tree.to_netcdf(tmp_path / "known.nc", engine="h5netcdf", invalid_netcdf=True)
+    with pytest.raises(StudyError, match=message) as caught:
+        load(STORED, tmp_path)
+    assert "problem 'hoffmann'" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_source_is_inherited_with_its_reference_alone(tmp_path):
+    shared = RING.replace("reference = { exact = true }", "reference = 0.25").replace(
+        'oberst2016"\n[comp', 'all"\n[comp'
+    )
+    problems = """
+[[compare.problem]]
+name = "shared"
+[[compare.problem]]
+name = "own"
+reference = 0.5
+[[compare.problem]]
+name = "told"
+source = "another look"
+[[compare.problem]]
+name = "both"
+reference = 0.5
+source = "by hand"
+"""
+    found = [one.race.reference for one in load(shared + problems, tmp_path).problems]
+    assert [(one.value, one.source) for one in found] == [
+        (0.25, "all"),
+        (0.5, ""),
+        (0.25, "another look"),
+        (0.5, "by hand"),
+    ]
 
 
 BROKEN = [

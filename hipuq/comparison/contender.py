@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import re
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from hipuq.driver import completed, estimated, method_named
@@ -20,6 +23,9 @@ Model = Callable[..., xr.Dataset]
 QUANTITIES = ("probability_overall", "probability", "mean_corrected", "mean_overall", "mean")
 """What is compared where nothing is named: the first of these that results have as one number."""
 
+
+NAME = re.compile(r"\S([^\r\n]{0,58}\S)?")
+"""What a name may be: a part of a line."""
 
 KEYS = ("method", "options", "model", "inputs", "of", "quantity", "budgets", "replicates")
 """What may be given for a contender."""
@@ -62,7 +68,7 @@ class Contender:
         """What it computes, JSON-able: the same definition and seed give the same numbers."""
         return {
             "method": self.method.title,
-            "model": model_definition(self.model),
+            "model": label_of(self.model) if options_of(self.model) is None else options_of(self.model),
             "inputs": self.inputs.to_json(),
             "of": self.of,
             "quantity": self.quantity,
@@ -115,9 +121,14 @@ class Contender:
         raise InputError(f"the results of {self.name!r} have no {' or '.join(QUANTITIES)} over everything")
 
 
-def model_definition(model: Model) -> Any:
-    """Return what rebuilds a model, JSON-able; of a plain function its name."""
-    return model.options if hasattr(model, "options") else label_of(model)
+def options_of(model: Model) -> Any:
+    """Return what rebuilds a model, JSON-able; None of a plain function, which does not say."""
+    return getattr(model, "options", None) if hasattr(model, "label") else None
+
+
+def same_model(one: Model, other: Model) -> bool:
+    """Say whether two models are the same, as far as they tell."""
+    return one is other or (options_of(one) is not None and bool(options_of(one) == options_of(other)))
 
 
 def label_of(model: Model) -> str:
@@ -156,6 +167,10 @@ def contender(
     InputError
         If it cannot be done.
     """
+    if not isinstance(name, str) or not NAME.fullmatch(name):
+        raise InputError(
+            f"the name of a contender is {name!r}: it takes 1 to 60 characters in a line, no space at an end"
+        )
     given = dict(entry) if isinstance(entry, Mapping) else {}
     if "method" not in given:
         raise InputError(f"contender {name!r} names no method: give a mapping with 'method' and 'options'")
@@ -180,6 +195,10 @@ def contender(
         raise InputError(f"budget {others[0]} of {name!r} is none of the comparison's {list(budgets)}")
     if own_replicates > replicates:
         raise InputError(f"replicates of {name!r} is {own_replicates}: the comparison has {replicates}")
+    try:
+        options = json.loads(json.dumps(options, default=_plain))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"options of {name!r}: {error}; give plain numbers, text and lists") from error
     stages = method.split(options)
     sizes = {b: _size(name, method, own_inputs, own_of, stages, b) for b in own_budgets}
     return Contender(name, method, own_model, own_inputs, own_of, own_quantity, stages, sizes, own_replicates)
@@ -199,6 +218,13 @@ def checked_budgets(budgets: Any, what: str = "budgets") -> list[int]:
     if not sizes or sorted(set(sizes)) != sizes:
         raise InputError(f"{what} are {sizes}: they must rise, one at least")
     return sizes
+
+
+def _plain(value: Any) -> Any:
+    """Return a number of numpy as one of Python."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"{value!r} is no plain value")
 
 
 def _size(

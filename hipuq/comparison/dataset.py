@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,9 +10,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from hipuq import schema
-from hipuq.comparison.contender import label_of, model_definition
-from hipuq.comparison.record import Record
-from hipuq.comparison.statistics import Cells, costs, errors, ranks, rates
+from hipuq.comparison.contender import label_of, same_model
+from hipuq.comparison.costs import costs
+from hipuq.comparison.record import Record, Run
+from hipuq.comparison.statistics import Cells, errors, ranks, rates
 from hipuq.sampling import spawn
 
 if TYPE_CHECKING:
@@ -36,6 +38,7 @@ NUMBERS = {
     "coverage_overall": ("share of intervals that hold the reference, over all {dims}", "1"),
     "rmse_ratio": ("root mean square error over the lowest of the budget", "1"),
     "rate": ("slope of the logarithm of the error over that of evaluations", "1"),
+    "intervals": ("runs that give an interval", "1"),
     "evaluations": ("model evaluations of a run", "1"),
     "replicates": ("runs", "1"),
     "seconds": ("time of a run", "s"),
@@ -76,9 +79,9 @@ def dataset(race: Race, record: Record, reference: NDArray[np.float64], seed: in
     rmse = numbers["rmse_overall" if extra else "rmse"]
     names = [one.name for one in race.contenders]
     place = names.index(race.baseline)
-    models = [model_definition(one.model) for one in race.contenders]
+    same = [same_model(one.model, race.contenders[place].model) for one in race.contenders]
     numbers |= ranks(rmse, resampled, level) | rates(rmse, resampled, cells.evaluations, level)
-    numbers |= costs(cells, rmse, place, [model == models[place] for model in models])
+    numbers |= costs(cells, rmse, resampled, place, same, level)
     by_run = {name: getattr(cells, name) for name in ("estimate", "low", "high", "seconds", "model_seconds")}
     by_cell = {"evaluations": cells.evaluations, "replicates": cells.replicates}
     ends = ("reference", "reference_low", "reference_high")
@@ -124,6 +127,7 @@ def dataset(race: Race, record: Record, reference: NDArray[np.float64], seed: in
         baseline=race.baseline,
         confidence=level,
         reference_source=race.reference.source,
+        jobs=", ".join(map(str, sorted({run.jobs for run in _used(race, record)}))),
         title="",
     )
 
@@ -139,21 +143,26 @@ def _cells(race: Race, record: Record, reference: NDArray[np.float64]) -> Cells:
     found = np.full((3, *shape, *reference.shape[1:]), np.nan)
     spent = np.full((2, *shape), np.nan)
     evaluations, replicates = np.zeros((2, *shape[:2]), np.int64)
-    for i, one in enumerate(race.contenders):
-        for j, budget in enumerate(race.budgets):
-            if budget not in one.sizes:
-                continue
-            replicates[i, j] = one.replicates
-            for k in range(one.replicates):
-                run = record.runs[one.name, budget, k]
-                found[:, i, j, k] = run.estimate, run.low, run.high
-                spent[:, i, j, k] = run.seconds, run.model_seconds
-                # A sequential method may need fewer than planned.
-                evaluations[i, j] = max(evaluations[i, j], run.evaluations)
+    names = [one.name for one in race.contenders]
+    for run in _used(race, record):
+        i, j = names.index(run.contender), race.budgets.index(run.budget)
+        replicates[i, j] += 1
+        found[:, i, j, run.replicate] = run.estimate, run.low, run.high
+        spent[:, i, j, run.replicate] = run.seconds, run.model_seconds
+        # A sequential method may need fewer than planned.
+        evaluations[i, j] = max(evaluations[i, j], run.evaluations)
     estimate, low, high = found
     seconds, model = spent
     exact = race.reference.exact
     return Cells(estimate, low, high, seconds, model, evaluations, replicates, reference[0], exact)
+
+
+def _used(race: Race, record: Record) -> Iterator[Run]:
+    """Give the runs that the comparison asks for; the record may hold more."""
+    for one in race.contenders:
+        for budget in one.sizes:
+            for k in range(one.replicates):
+                yield record.runs[one.name, budget, k]
 
 
 def _dims(name: str, size: int, extra: list[str]) -> tuple[str, ...]:

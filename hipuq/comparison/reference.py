@@ -43,6 +43,8 @@ class Reference:
     source: str = ""
 
     def __post_init__(self) -> None:
+        if (self.low is None) != (self.high is None):
+            raise InputError("the reference has one limit: give both, or none where it is exact")
         parts = [self.value] if self.exact else [self.low, self.value, self.high]
         numbers = [_values(part) for part in parts]
         shapes = {part.shape for part in numbers}
@@ -54,7 +56,7 @@ class Reference:
     @property
     def exact(self) -> bool:
         """Whether it has no limits."""
-        return self.low is None or self.high is None
+        return self.low is None
 
     def aligned(self, dims: list[str], coords: Mapping[str, list[Any]], what: str) -> Array:
         """Return value, low and high, (3, ...) in the order of a result.
@@ -107,7 +109,7 @@ def reference_from(results: xr.Dataset, quantity: str | None = None, source: str
     Raises
     ------
     InputError
-        If the results lack it, or it is not known everywhere.
+        If the results lack it or its limits, or it is not known everywhere.
     """
     names = [str(name) for name in results.data_vars]
     if quantity is None:
@@ -119,7 +121,7 @@ def reference_from(results: xr.Dataset, quantity: str | None = None, source: str
     value = results[quantity]
     ends = [f"{quantity}_{end}" for end in ("low", "high")]
     if not set(ends) <= set(names):
-        return Reference(value, source=source)
+        raise InputError(f"{quantity} of the reference has no limits: nothing says how far it can be trusted")
     low, high = (results[end] for end in ends)
     if all(np.allclose(end, value, SAME, 0.0) for end in (low, high)):
         return Reference(value, source=source)

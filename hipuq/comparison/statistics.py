@@ -1,9 +1,10 @@
-"""Error, coverage, convergence and cost of contenders, over their replicates, with limits."""
+"""Error, coverage and convergence of contenders, over their replicates, with limits."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +57,7 @@ class Cells:
 
 def errors(
     cells: Cells, rng: Callable[[int, int], np.random.Generator], level: float
-) -> tuple[dict[str, Array], Array]:
+) -> tuple[dict[str, NDArray[Any]], Array]:
     """Return bias, root mean square error and coverage of each cell.
 
     Parameters
@@ -71,15 +72,16 @@ def errors(
     -------
     numbers : dict of (m, b, ...) or (m, b) array
         By name; NaN in cells that were not run, or in which a replicate has no estimate. What ends in
-        ``_overall`` is over the extra dims too.
+        ``_overall`` is over the extra dims too. ``intervals`` counts the runs that gave any.
     resampled : (RESAMPLES, m, b) array
         Root mean square errors, over the extra dims too, of resampled replicates.
     """
     shape = cells.replicates.shape
     extra = cells.reference.shape
     names = ("bias", "bias_error", *(f"{n}{e}" for n in ("rmse", "coverage") for e in ("", "_low", "_high")))
-    found = {name: np.full(shape + extra, np.nan) for name in names}
+    found: dict[str, NDArray[Any]] = {name: np.full(shape + extra, np.nan) for name in names}
     overall = {f"{n}_overall{e}": np.full(shape, np.nan) for n in ("rmse", "coverage") for e in _ENDS}
+    found["intervals"] = np.zeros(shape, np.int64)
     resampled = np.full((RESAMPLES, *shape), np.nan)
     ends = [0.5 - level / 2, 0.5 + level / 2]
     for i, j, count in cells.each():
@@ -100,6 +102,7 @@ def errors(
         hits, told = _held(cells, i, j, count)
         found["coverage"][i, j], *limits = _share(hits.sum(axis=0), told.sum(axis=0), level)
         found["coverage_low"][i, j], found["coverage_high"][i, j] = limits
+        found["intervals"][i, j] = told.reshape(count, -1).sum(axis=0).min()
         middle, *limits = _share_over_runs(hits.reshape(count, -1), told.reshape(count, -1), level)
         overall["coverage_overall"][i, j] = middle
         overall["coverage_overall_low"][i, j], overall["coverage_overall_high"][i, j] = limits
@@ -155,8 +158,8 @@ def ranks(rmse: Array, resampled: Array, level: float) -> dict[str, Array]:
     Returns
     -------
     dict of (m, b) array
-        ``rmse_ratio`` with limits; 1 for the lowest. NaN where there is no error to compare, and for
-        others where the lowest is 0.
+        ``rmse_ratio`` with limits; 1 for the lowest, infinite for others where the lowest is 0. NaN
+        where there is no error to compare.
     """
     ratio, low, high = np.full((3, *rmse.shape), np.nan)
     ends = [0.5 - level / 2, 0.5 + level / 2]
@@ -196,7 +199,11 @@ def rates(rmse: Array, resampled: Array, evaluations: NDArray[np.int64], level: 
     rate, low, high = np.full((3, len(rmse)), np.nan)
     for i in range(len(rmse)):
         cells = np.isfinite(rmse[i]) & (evaluations[i] > 0)
-        if cells.sum() < 3 or not (resampled[:, i, cells] > 0).all() or not (rmse[i, cells] > 0).all():
+        if (
+            len(set(evaluations[i, cells])) < 3
+            or not (resampled[:, i, cells] > 0).all()
+            or not (rmse[i, cells] > 0).all()
+        ):
             continue
         x = np.log(evaluations[i, cells])
         x = x - x.mean()
@@ -204,68 +211,3 @@ def rates(rmse: Array, resampled: Array, evaluations: NDArray[np.int64], level: 
         slopes = np.log(resampled[:, i, cells]) @ x / (x @ x)
         low[i], high[i] = np.quantile(slopes, [0.5 - level / 2, 0.5 + level / 2])
     return {"rate": rate, "rate_low": low, "rate_high": high}
-
-
-def costs(cells: Cells, rmse: Array, baseline: int, same_model: list[bool]) -> dict[str, Array]:
-    """Return what the error of each contender would cost the baseline, and when the contender pays.
-
-    Parameters
-    ----------
-    cells : Cells
-    rmse : (m, b) array
-    baseline : int
-        Number of the contender that others are held against; its error is taken to fall as n**-1/2.
-    same_model : list of bool
-        Which contenders evaluate the model of the baseline.
-
-    Returns
-    -------
-    dict of (m, b) array
-        ``run_time`` and ``model_time``, medians over the replicates [s], ``baseline_evaluations``,
-        ``cost_ratio`` and ``break_even`` [s].
-    """
-    shape = rmse.shape
-    whole, model, plain, ratio, even = np.full((5, *shape), np.nan)
-    for i, j, count in cells.each():
-        whole[i, j] = np.median(cells.seconds[i, j, :count])
-        model[i, j] = np.median(cells.model_seconds[i, j, :count])
-    found = {
-        "run_time": whole,
-        "model_time": model,
-        "baseline_evaluations": plain,
-        "cost_ratio": ratio,
-        "break_even": even,
-    }
-    own = np.isfinite(rmse[baseline]) & (rmse[baseline] > 0)
-    if not own.any():
-        return found
-    n = cells.evaluations[baseline, own].astype(np.float64)
-    scale = np.average(n * rmse[baseline, own] ** 2, weights=cells.replicates[baseline, own])
-    total = _line(n, whole[baseline, own])
-    beside = _line(n, (whole - model)[baseline, own])
-    for i, j, _ in cells.each():
-        if np.isnan(rmse[i, j]):
-            continue
-        needed = scale / rmse[i, j] ** 2 if rmse[i, j] > 0 else np.inf
-        if i == baseline:
-            # Its own evaluations, not those of the line through its errors.
-            needed = float(cells.evaluations[i, j])
-        plain[i, j] = needed
-        ratio[i, j] = whole[i, j] / total(needed) if np.isfinite(needed) else 0.0
-        if same_model[i] and i != baseline:
-            saved = needed - cells.evaluations[i, j]
-            more = whole[i, j] - model[i, j] - beside(needed)
-            even[i, j] = np.inf if saved <= 0 else max(more / saved, 0.0) if np.isfinite(saved) else 0.0
-    return found
-
-
-def _line(n: Array, seconds: Array) -> Callable[[float], float]:
-    """Return the time of so many evaluations: between those measured, and on the line through them beyond."""
-    most = seconds[-1] / n[-1]
-    slope = float(np.clip(np.polyfit(n, seconds, 1)[0], 0.0, most)) if len(n) > 1 else most
-
-    def time(evaluations: float) -> float:
-        beyond = max(evaluations - float(n[-1]), 0.0)
-        return float(np.interp(evaluations, n, seconds)) + (slope or most) * beyond
-
-    return time

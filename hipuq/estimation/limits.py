@@ -11,6 +11,9 @@ from hipuq.intervals import replicated, student, wilson
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-12
+"""Relative scatter of replicates up to which they agree."""
+
 
 def columns(cells: Moments, bounds: list[Moments], kind: Kind, confidence: float) -> dict[str, Array]:
     """Return estimates and limits by stratum.
@@ -66,11 +69,12 @@ def _limit(cells: Moments, kind: Kind, confidence: float) -> tuple[Array, Array]
     if replicates == 1:
         return single
     mean = cells.mean.mean(axis=1)
-    squares = np.square(cells.mean - mean[:, None]).sum(axis=1)
+    # The mean of equal numbers may differ from them by rounding, which is no scatter.
+    agree = np.ptp(cells.mean, axis=1) <= ROUNDING * np.abs(cells.mean).max(axis=1)
+    squares = np.where(agree, 0.0, np.square(cells.mean - mean[:, None]).sum(axis=1))
     if shares:
         between = replicated(mean, squares, replicates, pooled.known, confidence)
     else:
         between = student(mean, squares, np.full_like(mean, replicates), confidence)
-    agree = squares == 0
     low, high = (np.where(agree, a, b) for a, b in zip(single, between, strict=True))
     return low, high

@@ -12,6 +12,8 @@ import xarray as xr
 from hipuq.methods.base import STAGES
 from hipuq.report import comparison_cost as cost
 from hipuq.report import comparison_error as error
+from hipuq.report import comparison_interval as interval
+from hipuq.report import comparison_winner as winner
 from hipuq.report.compared import (
     BEST,
     at_budgets,
@@ -19,6 +21,7 @@ from hipuq.report.compared import (
     budgets_of,
     entries,
     extras_of,
+    listed,
     lowest,
     names_of,
     parts_of,
@@ -55,6 +58,8 @@ def facts(race: xr.Dataset) -> list[str]:
     counts, used = values(race, "replicates"), values(race, "evaluations")
     total = f"{(counts * used).sum():,.0f} evaluations in all"
     lines.append(f"{int(counts.max()):,} replicates{_fewer(race)}, seed {race.attrs['seed']}, {total}")
+    if "," in (jobs := str(race.attrs.get("jobs", ""))):
+        lines.append(f"Timed with {listed(jobs.split(', '))} threads: times are not alike")
     return lines
 
 
@@ -94,11 +99,11 @@ def remarks(race: xr.Dataset) -> list[str]:
 
 def summary(race: xr.Dataset) -> list[str]:
     """Return the same with a line for who wins and one for all costs, where there is little room."""
-    return [line for line in [cost.winner_words(race), *_said(race), cost.cost_summary(race)] if line]
+    return [line for line in [winner.winner_words(race), *_said(race), cost.cost_summary(race)] if line]
 
 
 def _said(race: xr.Dataset) -> list[str]:
-    return [*filter(None, [error.bias_words(race), error.interval_words(race), _undefined(race)])]
+    return [*filter(None, [error.bias_words(race), interval.interval_words(race), _undefined(race)])]
 
 
 def _undefined(race: xr.Dataset) -> str:
@@ -162,9 +167,9 @@ def tables(race: xr.Dataset) -> list[Table]:
         error.error_table(race),
         parameter_table(race),
         error.bias_table(race),
-        error.interval_table(race),
-        cost.winner_table(race),
-        cost.time_table(race),
+        interval.interval_table(race),
+        winner.winner_table(race),
+        winner.time_table(race),
         cost.cost_table(race),
     ]
     return [table for table in made if table.rows]

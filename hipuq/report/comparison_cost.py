@@ -1,4 +1,4 @@
-"""Which contender wins and what it costs: tables over budgets and over time, and what is said of them."""
+"""What contenders cost: time against evaluations saved, where one would pay, and what is said of it."""
 
 from __future__ import annotations
 
@@ -8,21 +8,18 @@ import numpy as np
 import xarray as xr
 
 from hipuq.report.compared import (
-    NOT_TOLD_APART,
     Array,
     Flags,
     at_budgets,
     baseline_of,
     budgets_of,
-    entries,
     evaluation_seconds,
-    listed,
-    lowest,
-    marks,
     names_of,
+    other_model,
     span,
     values,
 )
+from hipuq.report.comparison_winner import NOTHING
 from hipuq.report.table import (
     MISSING,
     NEVER,
@@ -31,70 +28,16 @@ from hipuq.report.table import (
     duration,
     factor,
     sentence,
-    significant,
-    with_unit,
 )
 
 ALIKE = 1.25
-"""Ratio of times up to which they are about the same: errors are not known better."""
+"""Ratio of times up to which they are about the same, as they are where the limits of the ratio hold 1."""
 
-NOTHING = "-"
-"""What stands where there is nothing to tell."""
+UNTOLD, FROM_NONE = "not told apart", "from saving none"
+"""What is said where replicates do not tell whether any evaluations are saved."""
 
-
-def winner_table(race: xr.Dataset) -> Table:
-    """Return which contender has the lowest error of each budget; no rows for one contender."""
-    rmse = values(race, "rmse")
-    columns = ["evaluations", "lowest error", with_unit("error", race["rmse"]), "not told apart from it"]
-    rows = []
-    for j, budget in enumerate(budgets_of(race)):
-        first, near = winners(race, j)
-        if first:
-            error = significant(float(np.nanmin(rmse[:, j])))
-            rows.append([f"{budget:,}", listed(first), error, listed(near) if near else NOTHING])
-    return Table("Which wins within so many evaluations", columns, rows)
-
-
-def winners(race: xr.Dataset, j: int) -> tuple[list[str], list[str]]:
-    """Return who has the lowest error of a budget, and who is not told apart from it."""
-    named = list(zip(names_of(race), lowest(race)[:, j], marks(race), strict=True))
-    first = [name for name, best, _ in named if best]
-    return first, [name for name, _, marked in named if marked[j] == NOT_TOLD_APART]
-
-
-def winner_words(race: xr.Dataset) -> str:
-    """Return the winner of each budget in one line, with who may be the one; empty for one contender."""
-    parts = []
-    for j, budget in enumerate(budgets_of(race)):
-        first, near = winners(race, j)
-        if first:
-            others = near if len(near) < 2 else [f"{len(near)} others"]
-            parts.append((f"{budget:,}", " or ".join([listed(first), *others])))
-    if not parts:
-        return ""
-    who = [text for _, text in parts]
-    if len(parts) == len(budgets_of(race)) > 1 and len(set(who)) == 1:
-        return f"Lowest error: {who[0]} at every budget"
-    return f"Lowest error: {'; '.join(f'{text} at {budget}' for budget, text in parts)} evaluations"
-
-
-def time_table(race: xr.Dataset) -> Table:
-    """Return which contender has the lowest error within a time, by powers of 10 in the range there is."""
-    rmse, spent = values(race, "rmse"), values(race, "run_time")
-    known = np.isfinite(rmse) & np.isfinite(spent) & (spent > 0)
-    columns = ["time", "lowest error", "evaluations", "time of a run", with_unit("error", race["rmse"])]
-    title = "Which wins within a time: runs whose median takes no longer"
-    if race.sizes["method"] == 1 or not known.any():
-        return Table(title, columns, [])
-    first, last = (int(np.ceil(np.log10(end))) for end in (spent[known].min(), spent[known].max()))
-    rows = []
-    for power in range(first, last + 1):
-        allowed = np.where(known & (spent <= 10.0**power), rmse, np.inf)
-        i, j = np.unravel_index(int(allowed.argmin()), allowed.shape)
-        used = f"{values(race, 'evaluations')[i, j]:,.0f}"
-        cells = [names_of(race)[i], used, duration(spent[i, j]), significant(rmse[i, j])]
-        rows.append([duration(10.0**power), *cells])
-    return Table(title, columns, rows)
+PLAIN = -0.5
+"""Slope of log error over log evaluations that the baseline's errors are taken to have."""
 
 
 def cost_table(race: xr.Dataset) -> Table:
@@ -102,14 +45,13 @@ def cost_table(race: xr.Dataset) -> Table:
     baseline = baseline_of(race)
     spent, model = values(race, "run_time"), values(race, "model_time")
     one = evaluation_seconds(race)
-    same, ratio = values(race, "baseline_evaluations"), values(race, "cost_ratio")
-    used = values(race, "evaluations")
+    ratio, used = values(race, "cost_ratio"), values(race, "evaluations")
     rows = []
     for i, name in enumerate(names_of(race)):
         for j in np.flatnonzero(used[i] > 0):
             against = [NOTHING] * 3
             if name != baseline:
-                against = [count(same[i, j]), factor(ratio[i, j]), _pays(race, i, int(j))]
+                against = [_needed(race, i, int(j)), factor(ratio[i, j]), _pays(race, i, int(j))]
             times = [duration(spent[i, j]), duration(spent[i, j] - model[i, j]), duration(one[i, j])]
             rows.append([name, f"{used[i, j]:,.0f}", *times, *against])
     columns = [
@@ -120,28 +62,52 @@ def cost_table(race: xr.Dataset) -> Table:
         "one evaluation",
         f"{baseline}: evaluations for the same error",
         f"time over that of {baseline}",
-        "pays where one evaluation takes more than",
+        "pays where one evaluation takes longer than",
     ]
     note = (
         f"Times are medians over the replicates. {sentence(baseline)} is taken to have the same error with "
-        "so many evaluations as its error falls as n^-1/2; below 1 a contender takes less time than that"
+        f"so many evaluations as its error falls as n^-1/2: {_law(race)}. Below 1 a contender takes less "
+        "time than that. One evaluation is that of the largest run"
     )
     return Table("What it costs", columns, rows, note)
 
 
+def _law(race: xr.Dataset) -> str:
+    """Return whether the errors of the baseline fall as they are taken to."""
+    own = race.isel(method=names_of(race).index(baseline_of(race)))
+    rate, low, high = (float(own[f"rate{end}"]) for end in ("", "_low", "_high"))
+    if np.isnan(rate):
+        return "that law is not checked here"
+    said = f"its own errors fall as n^{rate:.2f} ({low:.2f} to {high:.2f})"
+    return said if low <= PLAIN <= high else f"{said}, so that evaluations for the same error are only rough"
+
+
+def _needed(race: xr.Dataset, i: int, j: int) -> str:
+    """Return the evaluations that the baseline would need, with limits."""
+    same, low, high = (values(race, f"baseline_evaluations{end}")[i, j] for end in ("", "_low", "_high"))
+    if not low < high:
+        return count(same)
+    return f"{count(same)}\n{count(low)} {f'to {count(high)}' if np.isfinite(high) else 'or more'}"
+
+
+def _saving(race: xr.Dataset) -> tuple[Flags, Flags]:
+    """Return which contenders surely save evaluations, and which surely save none, (m, b)."""
+    used = values(race, "evaluations")
+    same, low, high = (values(race, f"baseline_evaluations{end}") for end in ("", "_low", "_high"))
+    return (low > used) & (same > used), (high < used) & (same < used)
+
+
 def _pays(race: xr.Dataset, i: int, j: int) -> str:
-    """Return the time of one evaluation from which on a contender pays."""
+    """Return the time of one evaluation from which on a contender pays, where it surely does from some."""
     value = values(race, "break_even")[i, j]
     if np.isnan(value):
-        return "other model" if _other_model(race, i) else MISSING
-    return NEVER if np.isinf(value) else "always" if value <= 0 else duration(value)
-
-
-def _other_model(race: xr.Dataset, i: int) -> bool:
-    """Say whether a contender evaluates another model than the baseline."""
-    said = entries(race)
-    models = [said.get(name, {}).get("model") for name in (names_of(race)[i], baseline_of(race))]
-    return models[0] != models[1]
+        return "other model" if other_model(race, i) else MISSING
+    saves, never = (flags[i, j] for flags in _saving(race))
+    if never:
+        return NEVER
+    if not saves:
+        return f"{UNTOLD}\n{FROM_NONE}"
+    return "always" if value <= 0 else duration(value)
 
 
 def cost_words(race: xr.Dataset) -> list[str]:
@@ -171,12 +137,17 @@ def cost_words(race: xr.Dataset) -> list[str]:
 
 
 def _sides(race: xr.Dataset) -> Iterator[tuple[str, Array, dict[str, Flags]]]:
-    """Give each contender but the baseline: its ratios of time, and where they are less, the same, more."""
-    for name, ratio in zip(names_of(race), values(race, "cost_ratio"), strict=True):
+    """Give each contender but the baseline: its ratios of time, where they are surely less, surely more."""
+    parts = (values(race, "cost_ratio", end) for end in ("", "_low", "_high"))
+    for name, ratio, low, high in zip(names_of(race), *parts, strict=True):
         if name != baseline_of(race) and np.isfinite(ratio).any():
-            less, more = ratio < 1 / ALIKE, np.isfinite(ratio) & (ratio > ALIKE)
+            less, more = (ratio < 1 / ALIKE) & (high < 1), (ratio > ALIKE) & (low > 1)
             alike = np.isfinite(ratio) & ~less & ~more
-            yield name, ratio, {"less time": less, "about as much": alike, "more time": more}
+            yield (
+                name,
+                ratio,
+                {"less time": less, "about as much": alike, "more time": more},
+            )
 
 
 def _ratios(found: Array) -> str:
@@ -186,17 +157,26 @@ def _ratios(found: Array) -> str:
 
 def _remedy(race: xr.Dataset, i: int, among: Flags) -> str:
     """Return how slow a model would make it pay; empty where that is not known."""
-    pays = np.where(among, values(race, "break_even")[i], np.nan)
-    if np.isnan(pays).all():
-        return ": it evaluates another model" if _other_model(race, i) else ""
-    j = int(np.nanargmin(pays))
-    if np.isinf(pays[j]):
+    even = np.where(among, values(race, "break_even")[i], np.nan)
+    if np.isnan(even).all():
+        return ": it evaluates another model" if other_model(race, i) else ""
+    saves, never = (flags[i] & ~np.isnan(even) for flags in _saving(race))
+    if never.sum() == (~np.isnan(even)).sum():
         return ", and would with any model: it saves no evaluations"
-    if pays[j] <= 0:
+    if not saves.any():
+        return f": what it saves of evaluations is {UNTOLD} from none"
+    j, least = _least(even, saves)
+    if least <= 0:
         return ""
     here = duration(evaluation_seconds(race)[i, j])
     at = f"at {budgets_of(race)[j]:,} evaluations " if among.sum() > 1 else ""
-    return f": it would pay {at}where one evaluation takes longer than {duration(pays[j])} (here {here})"
+    return f": it would pay {at}where one evaluation takes longer than {duration(least)} (here {here})"
+
+
+def _least(even: Array, saves: Flags) -> tuple[int, float]:
+    """Return the budget by number at which a contender pays the soonest, and from which time on."""
+    j = int(np.where(saves, even, np.inf).argmin())
+    return j, float(even[j])
 
 
 def cost_summary(race: xr.Dataset) -> str:
@@ -210,9 +190,21 @@ def cost_summary(race: xr.Dataset) -> str:
         elif alike.any():
             said["about that of"].append(f"{name} {at_budgets(race, alike, known)}")
         else:
-            pays = np.where(more, values(race, "break_even")[names_of(race).index(name)], np.nan)
-            least = float(np.nanmin(pays, initial=np.inf))
-            slow = f" (pays from {duration(least)} an evaluation)" if 0 < least < np.inf else ""
+            slow = _slow(race, names_of(race).index(name), more)
             said["more than"].append(f"{name}{slow}")
     parts = [f"{text} {baseline_of(race)}: {', '.join(who)}" for text, who in said.items() if who]
     return f"Time for the same error: {'; '.join(parts)}" if parts else ""
+
+
+def _slow(race: xr.Dataset, i: int, among: Flags) -> str:
+    """Return in brackets whether a slower model would make it pay; empty where that is not known."""
+    even = np.where(among, values(race, "break_even")[i], np.nan)
+    known = ~np.isnan(even)
+    saves, never = (flags[i] & known for flags in _saving(race))
+    if not known.any():
+        return ""
+    if saves.any():
+        j, least = _least(even, saves)
+        at = f"at {budgets_of(race)[j]:,} evaluations " if known.sum() > 1 else ""
+        return f" (pays {at}where one evaluation takes longer than {duration(least)})" if least > 0 else ""
+    return " (saves no evaluations)" if never.sum() == known.sum() else f" ({UNTOLD} {FROM_NONE})"

@@ -1,4 +1,4 @@
-"""How far contenders are from the answer: tables of error, bias and intervals, and what is said of them."""
+"""How far contenders are from the answer: tables of error and bias, and what is said of them."""
 
 from __future__ import annotations
 
@@ -9,35 +9,25 @@ from scipy.special import ndtr, stdtrit
 from hipuq.plots.captions import parameter_label
 from hipuq.report.compared import (
     BEST,
+    FEWEST,
     NOT_TOLD_APART,
+    SIGMAS,
     Array,
     Flags,
+    another_model,
     at_budgets,
     budgets_of,
     extras_of,
-    level_of,
-    listed,
     marks,
     names_of,
+    other_models,
     parts_of,
     rounding_of,
     span,
     undefined,
     values,
 )
-from hipuq.report.table import MISSING, Table, percent, significant, with_unit
-
-SIGMAS = 3.0
-"""Standard errors beyond which a mean error is no accident, where replicates are many."""
-
-FEWEST = 10
-"""Replicates from which on a mean error is judged: with fewer their scatter itself is hardly known."""
-
-NARROW = 1.6
-"""Shares of misses, over the stated one, above which intervals are called too narrow: 8 % for 5 %."""
-
-WIDE = 0.4
-"""Shares of misses, over the stated one, below which intervals are called conservative: 2 % for 5 %."""
+from hipuq.report.table import MISSING, Table, significant, with_unit
 
 
 def error_table(race: xr.Dataset, *, brief: bool = False) -> Table:
@@ -72,7 +62,7 @@ def error_table(race: xr.Dataset, *, brief: bool = False) -> Table:
             cells.append("\n".join(lines))
         rows.append([name, *cells, *([_rate(race, i, brief=brief)] if rates else [])])
     columns = ["contender", *(f"{budget:,}" for budget in budgets_of(race)), *(["falls as"] if rates else [])]
-    return Table(f"Error: {_errors(race)}, by budget of evaluations", columns, rows, _legend(marked))
+    return Table(f"Error: {_errors(race)}, by budget of evaluations", columns, rows, _legend(race, marked))
 
 
 def _errors(race: xr.Dataset) -> str:
@@ -97,11 +87,15 @@ def _rate(race: xr.Dataset, i: int, *, brief: bool) -> str:
     return f"n^{rate:.2f}{limits}"
 
 
-def _legend(marked: list[list[str]]) -> str:
-    """Return what the marks in a table mean."""
+def _legend(race: xr.Dataset, marked: list[list[str]]) -> str:
+    """Return what the marks in a table mean, and whose evaluations are not those of the others."""
     seen = {mark for row in marked for mark in row}
     said = {BEST: "the lowest error of a budget", NOT_TOLD_APART: "not told apart from it"}
-    return "; ".join(f"{mark} {text}" for mark, text in said.items() if mark in seen)
+    parts = [f"{mark} {text}" for mark, text in said.items() if mark in seen]
+    others = other_models(race)[:, None] & (values(race, "evaluations") > 0)
+    if others.any():
+        parts.append(another_model(race, others))
+    return "; ".join(parts)
 
 
 def bias_table(race: xr.Dataset) -> Table:
@@ -205,45 +199,3 @@ def _label(race: xr.Dataset, part: int) -> str:
 
 def _columns(race: xr.Dataset) -> list[str]:
     return ["contender", *(f"{budget:,}" for budget in budgets_of(race))]
-
-
-def interval_table(race: xr.Dataset) -> Table:
-    """Return how many intervals hold the reference, with limits; no rows where no contender has any."""
-    share, low, high = (values(race, "coverage", end) for end in ("", "_low", "_high"))
-    levels = {level_of(race, name) for name in names_of(race)}
-    rows = []
-    for i, name in enumerate(names_of(race)):
-        cells = [
-            MISSING
-            if np.isnan(share[i, j])
-            else f"{percent(share[i, j])}\n{100 * low[i, j]:.1f} to {100 * high[i, j]:.1f}"
-            for j in range(race.sizes["budget"])
-        ]
-        label = name if len(levels) == 1 else f"{name} ({100 * level_of(race, name):g}\u00a0%)"
-        rows.append([label, *cells])
-    stated = f" (stated: {100 * levels.pop():g} %)" if len(levels) == 1 else " (stated: in brackets)"
-    title = f"Intervals: share that holds the reference{stated}, by budget of evaluations"
-    return Table(title, _columns(race), rows if np.isfinite(share).any() else [])
-
-
-def interval_words(race: xr.Dataset) -> str:
-    """Return whose intervals are too narrow, whose conservative, who gives none, as far as limits tell."""
-    share, low, high = (values(race, "coverage", end) for end in ("", "_low", "_high"))
-    told, ran = np.isfinite(share), values(race, "evaluations") > 0
-    said: dict[str, list[str]] = {"too narrow": [], "conservative": []}
-    for i, name in enumerate(names_of(race)):
-        level = level_of(race, name)
-        narrow = told[i] & (high[i] < level) & (1 - share[i] > NARROW * (1 - level))
-        wide = told[i] & (low[i] > level) & (1 - share[i] < WIDE * (1 - level))
-        for text, flags in zip(said, (narrow, wide), strict=True):
-            if flags.any():
-                found = span([f"{100 * value:.0f}" for value in sorted(share[i, flags])])
-                where = at_budgets(race, flags, told[i])
-                said[text].append(f"{name} {where} ({found} %, stated {100 * level:g} %)")
-    parts = [f"{text}: {', '.join(who)}" for text, who in said.items() if who]
-    if not parts and told.any():
-        parts = ["are not seen to be too narrow or conservative"]
-    none = [name for i, name in enumerate(names_of(race)) if ran[i].any() and not told[i].any()]
-    if none and told.any():
-        parts.append(f"{listed(none)} {'gives' if len(none) == 1 else 'give'} none")
-    return f"Intervals {'; '.join(parts)}" if parts else "Intervals: no contender gives any"

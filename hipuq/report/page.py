@@ -14,7 +14,7 @@ import xarray as xr
 from hipuq import schema
 from hipuq.errors import StoreError
 from hipuq.report import comparison as methods
-from hipuq.report.comparison_cost import winner_words
+from hipuq.report.comparison_winner import winner_words
 from hipuq.report.figures import pictures
 from hipuq.report.partners import comparison, groups_of
 from hipuq.report.sensitivity import has_indices, note, remarks

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+BEYOND = 1e12
+"""Counts above it, and ratios below its inverse, are told as such: no more is to be read from them."""
+
 MISSING = "n/a"
 """What stands for a number that does not exist."""
 
@@ -62,6 +65,8 @@ def count(value: float) -> str:
         return MISSING
     if np.isinf(value):
         return NEVER
+    if value > BEYOND:
+        return f"over {BEYOND:.0e}"
     return f"{value:,.0f}" if value < 1e6 else f"{value:.2e}"
 
 
@@ -69,6 +74,8 @@ def factor(value: float) -> str:
     """Return a ratio as text with two digits."""
     if not np.isfinite(value):
         return MISSING
+    if 0 < value < 1 / BEYOND:
+        return f"under {1 / BEYOND:.0e}"
     return f"{float(f'{value:.2g}'):,.0f}" if value >= 100 else significant(value, 2)
 
 

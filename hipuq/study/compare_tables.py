@@ -172,10 +172,18 @@ class CompareTable(Settings):
         return self
 
     def problems(self) -> list[ProblemTable]:
-        """Return the problems, each with all its settings."""
+        """Return the problems, each with all its settings.
+
+        A source is that of a reference: a problem with its own reference does not inherit it.
+        """
         shared = {key: getattr(self, key) for key in Settings.model_fields if key in self.model_fields_set}
         entries = self.problem or [ProblemTable.model_construct(name=self.of)]
         return [
-            one.model_copy(update={k: v for k, v in shared.items() if k not in one.model_fields_set})
-            for one in entries
+            one.model_copy(update={k: v for k, v in shared.items() if k not in _own(one)}) for one in entries
         ]
+
+
+def _own(problem: ProblemTable) -> set[str]:
+    """Return the settings that a problem does not inherit."""
+    given = problem.model_fields_set
+    return given | {"source"} if "reference" in given else given

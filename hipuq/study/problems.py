@@ -70,6 +70,26 @@ class Problem:
         key = zlib.crc32(COMPARE.encode()), zlib.crc32(self.name.encode())
         return seed_of(np.random.SeedSequence(study_seed, spawn_key=key))
 
+    def rehearsed(self, n_jobs: int | None = None) -> Problem:
+        """Return it with its reference computed, after one small run of each contender.
+
+        Parameters
+        ----------
+        n_jobs : int, optional
+            Threads; all cores by default.
+
+        Raises
+        ------
+        InputError
+            If results lack what is compared, or contenders or reference do not agree; it names the problem.
+        """
+        try:
+            whole = self._with_reference(n_jobs)
+            whole.race.rehearse(n_jobs)
+        except InputError as error:
+            raise InputError(f"problem {self.name!r}: {error}") from error
+        return whole
+
     def run(
         self,
         study_seed: int,
@@ -94,10 +114,7 @@ class Problem:
         -------
         Dataset
         """
-        whole = (
-            self.race if self.exact is None else replace(self.race, reference=self.exact.reference(n_jobs))
-        )
-        results = whole.run(
+        results = self._with_reference(n_jobs).race.run(
             self.seed(study_seed),
             n_jobs=n_jobs,
             store=self.store(folder),
@@ -106,6 +123,12 @@ class Problem:
             say=say,
         )
         return results.assign_attrs(title=self.title)
+
+    def _with_reference(self, n_jobs: int | None) -> Problem:
+        """Return it with its reference computed, where the study has to."""
+        if self.exact is None:
+            return self
+        return replace(self, race=replace(self.race, reference=self.exact.reference(n_jobs)), exact=None)
 
 
 def problems_of(table: StudyFile, folder: Path) -> tuple[Problem, ...]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import xarray as xr
 
-from hipuq.comparison import Reference, reference_from
+from hipuq.comparison import QUANTITIES, Reference, reference_from
 from hipuq.driver import run as run_method
 from hipuq.driver import with_bounds
 from hipuq.errors import InputError, StudyError, check_name
@@ -171,25 +171,43 @@ def _stored(
     results = groups[of].to_dataset(inherit=False)
     where = f"{asked.results}, {asked.analysis}/{of}"
     _check_same(results, where, model, given)
+    _check_numbers(results, where, table.quantity)
     return reference_from(results, table.quantity, "; ".join(filter(None, [table.source, where])))
+
+
+def _check_numbers(results: xr.Dataset, where: str, quantity: str | None) -> None:
+    """Raise an InputError if what may become the reference is not one of numbers."""
+    for name in QUANTITIES if quantity is None else (quantity,):
+        for end in ("", "_low", "_high"):
+            found = results.get(f"{name}{end}")
+            if found is None:
+                continue
+            if found.dtype.kind not in "iuf":
+                raise InputError(f"{where} has a {name}{end} of type {found.dtype}, not of real numbers")
+            if name in results and (found.dims, found.shape) != (results[name].dims, results[name].shape):
+                raise InputError(f"{where} has a {name}{end} of another shape than {name}")
 
 
 def _check_same(results: xr.Dataset, where: str, model: CEAModel, given: Mapping[str, object]) -> None:
     """Raise an InputError if results are not of this problem; friction may be integrated in them."""
+    unsaid = f"{where} does not say of which model and inputs it is: no reference"
     try:
         there = {
             "model": json.loads(results.attrs["options"])["model"],
             "inputs": json.loads(results.attrs["inputs"]),
         }
-    except (KeyError, TypeError, ValueError):
-        raise InputError(f"{where} does not say of which model and inputs it is: no reference") from None
+    except (KeyError, TypeError, ValueError, RecursionError):
+        raise InputError(unsaid) from None
     own: CEAModel | FrictionIntegrated = model
     rest = dict(given)
     if isinstance(there["model"], dict) and "integrated" in there["model"] and FRICTION in rest:
         own, rest = without_friction(model, given)
     inputs = json.loads(own.inputs(**rest).to_json()) if rest else {}
     here: dict[str, Any] = {"model": json.loads(json.dumps(own.options)), "inputs": inputs}
-    found = difference(there, here)
+    try:
+        found = difference(there, here)
+    except RecursionError:
+        raise InputError(unsaid) from None
     if found is not None:
         place, before, after = found
         raise InputError(f"{where} is of another problem: it has {place} {before}, this one {after}")

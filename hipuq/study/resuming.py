@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,14 @@ import numpy as np
 import xarray as xr
 
 from hipuq import __version__
+from hipuq.comparison.record import Record
 from hipuq.errors import StoreError
 from hipuq.sampling import seed_of
 from hipuq.store import RESULTS_NAME, load_results
 from hipuq.study.differences import difference
+from hipuq.study.file import COMPARE
 from hipuq.study.plan import Analysis, Study
+from hipuq.study.problems import Problem
 
 DEFINITIONS = "analyses"
 """Root attribute of results: analysis -> what it was computed from, JSON."""
@@ -52,8 +56,31 @@ def _definition(analysis: Analysis, seed: int) -> dict[str, Any]:
     }
 
 
-def kept(study: Study, folder: Path) -> dict[str, Groups]:
-    """Return the analyses of an earlier run that are complete.
+@dataclass(frozen=True)
+class Earlier:
+    """What an output folder holds of a study.
+
+    Attributes
+    ----------
+    analyses : dict
+        Complete analysis -> its groups, named as in the results. What the report shows at nominal values is
+        left out if the report has changed.
+    comparisons : dict
+        Groups of problems, as they are until the problem is complete again.
+    runs : dict
+        Problem -> number of runs that need not be done again.
+    dropped : dict
+        Analyses and groups that are left out -> why.
+    """
+
+    analyses: dict[str, Groups] = field(default_factory=dict)
+    comparisons: Groups = field(default_factory=dict)
+    runs: dict[str, int] = field(default_factory=dict)
+    dropped: dict[str, str] = field(default_factory=dict)
+
+
+def earlier(study: Study, folder: Path) -> Earlier:
+    """Return what of an earlier run is kept; nothing is written.
 
     Parameters
     ----------
@@ -63,21 +90,76 @@ def kept(study: Study, folder: Path) -> dict[str, Groups]:
 
     Returns
     -------
-    dict
-        Analysis -> its groups, named as in the results. What the report shows at nominal values is left
-        out if the report has changed. Analyses that are no longer in the study are left out.
+    Earlier
 
     Raises
     ------
     StoreError
-        If the results cannot be read, or an analysis in them was made in another way; it says what differs.
+        If results or runs cannot be read, or were made in another way; it says what differs.
     """
+    runs = {one.name: _runs(one, study.seed, folder) for one in study.problems}
     if not (folder / RESULTS_NAME).exists():
-        return {}
+        return Earlier(runs=runs)
     tree = load_results(folder)
+    analyses = _analyses(study, folder, tree)
+    report = dict(zip(AT_NOMINAL, (study.report.friction_sweep, study.report.mode_shapes), strict=True))
+    gone = [name for name in tree.children if name not in {COMPARE, *(one.name for one in study.analyses)}]
+    for one in analyses:
+        gone += [f"{one}/{name}" for name, own in report.items() if not own and name in tree.children[one]]
+    dropped = {str(name): "the study no longer has it" for name in gone}
+    seeds = {one.group: one.seed(study.seed) for one in study.problems}
+    comparisons: Groups = {}
+    for name, node in tree.children[COMPARE].children.items() if COMPARE in tree.children else ():
+        group, own = f"{COMPARE}/{name}", node.to_dataset(inherit=False).drop_encoding()
+        if group not in seeds:
+            dropped[group] = "the study no longer has it"
+        elif str(own.attrs.get("seed")) != str(seeds[group]):
+            dropped[group] = "it was made with another seed"
+        else:
+            comparisons[group] = own
+    return Earlier(analyses, comparisons, runs, dropped)
+
+
+def would_keep(study: Study, folder: Path) -> list[str]:
+    """Return lines about what `run_study` with resume would keep; nothing is written.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Output folder.
+
+    Raises
+    ------
+    StoreError
+        Where it would refuse what is in the folder.
+    """
+    before = earlier(study, folder)
+    lines = [f"{name}: would be kept, complete in {folder}" for name in before.analyses]
+    for one in study.problems:
+        runs = sum(len(own.sizes) * own.replicates for own in one.race.contenders)
+        lines.append(f"{one.group}: {before.runs[one.name]:,} of {runs:,} runs would be kept")
+    return lines + [f"{name}: would be dropped, {why}" for name, why in before.dropped.items()]
+
+
+def _runs(problem: Problem, seed: int, folder: Path) -> int:
+    """Return how many runs of a problem are there."""
+    race, file = problem.race, problem.store(folder)
+    race.check(problem.seed(seed), file)
+    there = Record.read(file, None).runs
+    return sum(
+        (one.name, budget, k) in there and there[one.name, budget, k].n == n
+        for one in race.contenders
+        for budget, n in one.sizes.items()
+        for k in range(one.replicates)
+    )
+
+
+def _analyses(study: Study, folder: Path, tree: xr.DataTree) -> dict[str, Groups]:
+    """Return the analyses that are complete."""
     try:
         before = json.loads(tree.attrs.get(DEFINITIONS, "{}"))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, RecursionError):
         before = {}
     asked = definitions(study)
     same_report = tree.attrs.get("report") == study.report.model_dump_json()
@@ -100,9 +182,12 @@ def _check_same(name: str, before: Any, asked: dict[str, Any], folder: Path) -> 
     """Raise a StoreError if an analysis in the folder is not the one that the study asks for."""
     rest = "run without --resume, or choose another folder with --out"
     there = before.get(name) if isinstance(before, dict) else None
+    try:
+        found = difference(there, asked)
+    except RecursionError:
+        there = None
     if there is None:
         raise StoreError(f"analysis {name!r} in {folder} does not say how it was made: {rest}")
-    found = difference(there, asked)
     if found is not None:
         place, old, new = found
         raise StoreError(

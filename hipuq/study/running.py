@@ -18,7 +18,7 @@ from hipuq.evaluation import evaluate
 from hipuq.models import CEAModel
 from hipuq.store import RESULTS_NAME, add_results, load_results, save_outcomes, save_results
 from hipuq.study.plan import Analysis, Study
-from hipuq.study.resuming import DEFINITIONS, Groups, analysis_seed, definitions, kept
+from hipuq.study.resuming import DEFINITIONS, Earlier, Groups, analysis_seed, definitions, earlier
 from hipuq.study.tables import ReportTable
 
 
@@ -40,13 +40,14 @@ def run_study(
         Output folder; gets ``outcomes/<analysis>.zarr``, ``compare/<problem>.jsonl`` and ``results.nc``.
     resume : bool, default False
         Whether to go on from what is in the folder: analyses that are complete and single runs of
-        comparisons are kept, so that the results are those of a run that was not cut off.
+        comparisons are kept, so that the results are those of a run that was not cut off. Old results of
+        a comparison stay in the file until it is complete again.
     n_jobs : int, optional
         Threads; all cores by default.
     progress : bool, optional
         Whether to show progress bars; by default on a terminal.
     say : callable, optional
-        Gets a line about each analysis, and about each budget of a comparison.
+        Gets a line about each analysis, each budget of a comparison, and what the file no longer has.
 
     Returns
     -------
@@ -57,26 +58,31 @@ def run_study(
 
     Raises
     ------
+    InputError
+        If results of a comparison lack what is compared, or its contenders or reference do not agree; each
+        contender runs once for it before the first analysis.
     StoreError
         If the folder cannot be written, or what is to be kept in it was made in another way.
     """
     folder = Path(out)
     _check_writable(folder)
-    before = kept(study, folder) if resume else {}
-    for problem in study.problems if resume else ():
-        problem.race.check(problem.seed(study.seed), problem.store(folder))
-    old = [] if resume else [one.store(folder) for one in study.problems]
-    results = _Results(folder, _root(study), old)
-    if before:
-        results.add({key: own for groups in before.values() for key, own in groups.items()})
+    before = earlier(study, folder) if resume else Earlier()
+    problems = [problem.rehearsed(n_jobs) for problem in study.problems]
+    for name, why in before.dropped.items():
+        say(f"{name}: dropped from {folder / RESULTS_NAME}, {why}")
+    old = [] if resume else [one.store(folder) for one in problems]
+    names = ["/", *(one.name for one in study.analyses), *(one.group for one in problems)]
+    results = _Results(folder, names, _root(study) | before.comparisons, old)
+    if before.analyses:
+        results.add({key: own for groups in before.analyses.values() for key, own in groups.items()})
     for i, analysis in enumerate(study.analyses):
-        if analysis.name in before:
-            results.add(_at_nominal(analysis, study.report, n_jobs, before[analysis.name]))
+        if analysis.name in before.analyses:
+            results.add(_at_nominal(analysis, study.report, n_jobs, before.analyses[analysis.name]))
             say(f"{analysis.name}: kept, complete in {folder}")
             continue
         results.add(_analysed(analysis, study, i, folder, n_jobs, progress, say))
     results.give_way()
-    for problem in study.problems:
+    for problem in problems:
         found = problem.run(
             study.seed,
             folder,
@@ -90,7 +96,7 @@ def run_study(
             f"{problem.group}: complete, {problem.evaluations:,} evaluations, "
             f"runs of {float(found['seconds'].sum()):.1f} s in all"
         )
-    return results.tree(study)
+    return results.tree()
 
 
 @dataclass
@@ -98,14 +104,16 @@ class _Results:
     """Results in memory and in the file; what is old gives way to the first ones, and not before."""
 
     folder: Path
+    names: list[str]
     groups: Groups
     old: list[Path]
     begun: bool = False
 
     def add(self, found: Groups) -> None:
+        replaced = not self.groups.keys().isdisjoint(found)
         self.groups |= found
-        if not self.begun:
-            save_results(xr.DataTree.from_dict(self.groups), self.folder / RESULTS_NAME)
+        if not self.begun or replaced:
+            self._save()
             self.begun = True
             self.give_way()
         elif found:
@@ -120,19 +128,19 @@ class _Results:
                 raise StoreError(f"cannot remove {file}: {error.strerror}") from error
         self.old = []
 
-    def tree(self, study: Study) -> xr.DataTree:
+    def tree(self) -> xr.DataTree:
         """Return all results in the order of the study, and have the file in that order too."""
-        names = [one.name for one in study.analyses]
-        order = sorted(self.groups, key=lambda key: self._place(key, names))
-        tree = xr.DataTree.from_dict({key: self.groups[key] for key in order})
-        if order != list(self.groups):
-            save_results(tree, self.folder / RESULTS_NAME)
-        return tree
+        if list(self.groups) != self._order():
+            self._save()
+        return xr.DataTree.from_dict(self.groups)
 
-    @staticmethod
-    def _place(key: str, names: list[str]) -> int:
-        first = key.split("/")[0]
-        return -1 if key == "/" else names.index(first) if first in names else len(names)
+    def _order(self) -> list[str]:
+        names = self.names
+        return sorted(self.groups, key=lambda key: names.index(key if key in names else key.split("/")[0]))
+
+    def _save(self) -> None:
+        self.groups = {key: self.groups[key] for key in self._order()}
+        save_results(xr.DataTree.from_dict(self.groups), self.folder / RESULTS_NAME)
 
 
 def _root(study: Study) -> Groups:
