@@ -13,7 +13,8 @@ from hipuq.comparison.record import Record
 from hipuq.errors import StoreError
 
 INPUTS = hipuq.Inputs(a=cp.Uniform(0.0, 1.0), b=cp.Uniform(0.0, 1.0))
-TIMES = ["seconds", "model_seconds", "run_time", "model_time", "cost_ratio", "break_even"]
+COSTS = ["cost_ratio", "cost_ratio_low", "cost_ratio_high", "break_even"]
+TIMES = ["seconds", "model_seconds", "run_time", "model_time", *COSTS]
 CONTENDERS = {
     "random": {"method": "monte_carlo"},
     "chaos": {"method": "chaos", "options": {"degree": 2}, "replicates": 2},
