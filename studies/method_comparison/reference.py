@@ -5,7 +5,7 @@ python studies/method_comparison/reference.py [--out reference.nc] [--runs 128] 
 
 Nine oscillators in contact, undamped; friction, stiffnesses and angles scattered, 39 numbers. There is no
 closed form, so independent runs of scrambled Sobol points are pooled: each is unbiased, and how they
-scatter tells the error of their mean. About 12 million evaluations, 8 minutes on two cores; give smaller
+scatter tells the error of their mean. About 12 million evaluations, 10 minutes on two cores; give smaller
 sizes to try it. The file that comes with the study is the one that the default sizes make.
 """
 
