@@ -21,6 +21,7 @@ from hipuq.report.compared import (
 )
 from hipuq.report.comparison_winner import NOTHING
 from hipuq.report.table import (
+    BEYOND,
     MISSING,
     NEVER,
     Table,
@@ -85,7 +86,7 @@ def _law(race: xr.Dataset) -> str:
 def _needed(race: xr.Dataset, i: int, j: int) -> str:
     """Return the evaluations that the baseline would need, with limits."""
     same, low, high = (values(race, f"baseline_evaluations{end}")[i, j] for end in ("", "_low", "_high"))
-    if not low < high:
+    if not low < high or low > BEYOND:
         return count(same)
     return f"{count(same)}\n{count(low)} {f'to {count(high)}' if np.isfinite(high) else 'or more'}"
 
