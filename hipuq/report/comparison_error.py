@@ -54,7 +54,7 @@ def error_table(race: xr.Dataset, *, brief: bool = False) -> Table:
         for j, budget in enumerate(budgets_of(race)):
             lines = [f"{significant(rmse[i, j])} {marked[i][j]}".strip()]
             if not brief and low[i, j] < high[i, j]:
-                lines.append(f"{significant(low[i, j])} to {significant(high[i, j])}")
+                lines.append(f"{significant(low[i, j], 2)} to {significant(high[i, j], 2)}")
             if np.isnan(rmse[i, j]) and open_[i, j]:
                 lines.append(_open(race, i, j, int(open_[i, j]), brief=brief))
             if not brief and used[i, j] not in (0, budget):
