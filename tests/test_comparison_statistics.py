@@ -207,6 +207,22 @@ def test_times_of_the_baseline_are_carried_on_below_and_beyond():
     np.testing.assert_allclose(found["cost_ratio"][1], [1e-3 / 1.25e-3, 1e-3 / 0.101])
 
 
+def test_a_baseline_that_hardly_ever_errs_has_wide_limits():
+    """7 of 8 replicates are exact: a third of the resamples have no error at all."""
+    rng = np.random.default_rng(3)
+    estimate = np.stack([np.array([[1.0] + [0.0] * 7]), rng.normal(size=(1, 8))])
+    seconds = np.full((2, 1, 8), 1e-3)
+    given = cells(estimate, evaluations=[[16], [16]], seconds=seconds, model=0.0)
+    found, resampled = errors(given, stream, 0.95)
+    assert (resampled[:, 0, 0] == 0).mean() == pytest.approx((7 / 8) ** 8, abs=0.05)
+    made = costs(given, found["rmse"], resampled, 0, [True, True], 0.95)
+    assert made["baseline_evaluations_low"][1, 0] == 0.0
+    assert 0.0 < made["baseline_evaluations"][1, 0] < made["baseline_evaluations_high"][1, 0]
+    low, middle, high = (made[f"cost_ratio{end}"][:, 0] for end in ("_low", "", "_high"))
+    assert low[0] == middle[0] == high[0] == 1.0
+    assert low[1] < middle[1] < high[1] == np.inf
+
+
 def test_times_of_a_baseline_without_an_error_count():
     """Its error is unknown with 100 evaluations, its time is not."""
     n = np.array([[100, 400], [100, 400]])

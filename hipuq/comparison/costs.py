@@ -41,12 +41,13 @@ def costs(
         whole[i, j] = np.median(cells.seconds[i, j, :count])
         model[i, j] = np.median(cells.model_seconds[i, j, :count])
     needed = _needed(cells, rmse[None], baseline)[0]
-    ends = np.quantile(
-        _needed(cells, resampled, baseline),
-        [0.5 - level / 2, 0.5 + level / 2],
-        axis=0,
-        method="inverted_cdf",
-    )
+    needed = np.where(needed > 0, needed, np.nan)
+    drawn = _needed(cells, resampled, baseline)
+    # A resample in which nobody errs tells nothing: it widens both limits.
+    ends = [
+        np.quantile(np.where(np.isnan(drawn) & ~np.isnan(needed), away, drawn), q, 0, method="inverted_cdf")
+        for q, away in ((0.5 - level / 2, 0.0), (0.5 + level / 2, np.inf))
+    ]
     ran = cells.evaluations[baseline] > 0
     n = cells.evaluations[baseline, ran].astype(np.float64)
     total, beside = _line(n, whole[baseline, ran]), _line(n, (whole - model)[baseline, ran])
@@ -54,8 +55,9 @@ def costs(
         if np.isnan(needed[i, j]):
             continue
         # More evaluations of the baseline cost it more: the limits change places.
-        for found, count in ((ratio, needed[i, j]), (least, ends[1, i, j]), (most, ends[0, i, j])):
-            found[i, j] = whole[i, j] / total(count) if np.isfinite(count) else 0.0
+        for found, count in ((ratio, needed[i, j]), (least, ends[1][i, j]), (most, ends[0][i, j])):
+            spent = total(count) if np.isfinite(count) else np.inf
+            found[i, j] = 1.0 if i == baseline else whole[i, j] / spent if spent > 0 else np.inf
         if same_model[i] and i != baseline:
             saved = needed[i, j] - cells.evaluations[i, j]
             more = whole[i, j] - model[i, j] - beside(needed[i, j]) if np.isfinite(saved) else 0.0
@@ -86,7 +88,7 @@ def _needed(cells: Cells, rmse: Array, baseline: int) -> Array:
     )
     scale = scale[:, None, None]
     needed = np.divide(scale, rmse**2, out=np.full_like(rmse, np.inf), where=rmse > 0)
-    needed = np.where(np.isnan(rmse) | (scale == 0), np.nan, needed)
+    needed = np.where(np.isnan(rmse) | ((scale == 0) & (rmse == 0)), np.nan, needed)
     # The line through its errors is not what it was run with.
     needed[:, baseline] = np.where(np.isnan(rmse[:, baseline]), np.nan, n)
     return needed

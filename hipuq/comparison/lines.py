@@ -132,6 +132,8 @@ def checked_run(
         value = found[name]
         if type(value) not in (int, float) or not 0 <= float(value) < math.inf:
             raise ValueError(f"{name} is {short(value)}, not a time")
+    if not found["seconds"] > 0:
+        raise ValueError("seconds is 0: no run takes no time")
     for name in NUMBERS:
         if _shape(found[name]) != shape:
             wanted = f"numbers of shape {shape}" if shape else "a number"

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 SUBDIVISIONS = ((1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0), (1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
 """Labels within a decade, the closest first."""
 
-ROOM = (0.75, 0.3)
+ROOM = (0.75, 0.25)
 """Room that a label takes along the x and the y axis [inch]."""
 
 EMPTY = 3
@@ -96,7 +96,7 @@ def set_log_y(ax: Axes, values: ArrayLike) -> list[tuple[float, float]]:
 
 def _break(ax: Axes, parts: list[tuple[float, float]]) -> None:
     """Give the y axis a scale on which the decades between parts, given as exponents, take little room."""
-    share = max(BREAK, 0.75 * ROOM[1] / (HEIGHT_LEFT * inches(ax)[1]))
+    share = max(BREAK, 0.9 * ROOM[1] / (HEIGHT_LEFT * inches(ax)[1]))
     height = share * sum(high - low for low, high in parts)
     knots = np.array([-FAR, *np.ravel(parts), FAR])
     steps = np.diff(knots)
@@ -159,7 +159,8 @@ def _label_parts(axis: Axis, parts: list[tuple[float, float]]) -> None:
 def _most(axis: Axis) -> int:
     """Return how many labels an axis has room for."""
     upright = axis is axis.axes.yaxis
-    return max(2, int(inches(axis.axes)[upright] / ROOM[upright]))
+    left = HEIGHT_LEFT if upright else 1.0
+    return max(2, int(left * inches(axis.axes)[upright] / ROOM[upright]))
 
 
 def _power(x: float) -> str:
