@@ -209,6 +209,7 @@ DAMAGED = [
     (4, lambda line: changed(line, budget=True), "line 4 of .*budget is True"),
     (4, lambda line: changed(line, replicate=0.5), "line 4 of .*replicate is 0.5"),
     (4, lambda line: changed(line, seconds=-1.0), "line 4 of .*seconds is -1.0"),
+    (4, lambda line: changed(line, seconds=0), "line 4 of .*no run takes no time"),
     (4, lambda line: changed(line, model_seconds=np.nan), "line 4 of .*model_seconds is nan"),
     (4, lambda line: changed(line, seconds=10**400), "line 4 of .*too large"),
     (4, lambda line: changed(line, seconds=np.inf), "line 4 of .*seconds is inf"),
