@@ -385,7 +385,7 @@ BROKEN = [
         "options = { smpler = 1 }",
         "contender 'latin hypercube': unknown",
     ),
-    ('sampler = "latin_hypercube"', 'sampler = "latin"', "problem 'hoffmann': "),
+    ('sampler = "latin_hypercube"', 'sampler = "latin"', "problem 'hoffmann': unknown sampler 'latin'"),
     ('method = "sobol"', 'method = "sobl"', "contender 'sobol': unknown method 'sobl'"),
     ("[compare.contenders.random]", '[compare.contenders." random"]', "contender ' random': "),
     ("[compare.problem.inputs.k3]", "[compare.problem.inputs.k33]", "did you mean 'k3'"),
