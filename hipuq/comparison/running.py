@@ -98,10 +98,9 @@ class Race:
             If the file cannot be used, or holds runs of something else.
         """
         jobs = os.cpu_count() or 1 if n_jobs is None else check_count("n_jobs", n_jobs)
-        file = self._file(store)
         if resume:
-            self.check(seed, store)
-        record = Record.opened(file, self._definition(seed), resume)
+            self._check_models()
+        record = Record.opened(self._file(store), self._definition(seed), resume)
         done = {key: run.n for key, run in record.runs.items()}
         # Contenders take turns, so that another load on the machine hits all alike.
         left = [
@@ -136,12 +135,7 @@ class Race:
         StoreError
             If the file cannot be read, or holds runs of something else.
         """
-        for one in self.contenders:
-            if options_of(one.model) is None:
-                raise InputError(
-                    f"the model of {one.name!r} has no label and options, by which resume could tell whether "
-                    "runs are its own: set both (options: what it depends on), or do not resume"
-                )
+        self._check_models()
         Record.read(self._file(store), self._definition(seed))
 
     def rehearse(self, n_jobs: int | None = None) -> None:
@@ -155,6 +149,14 @@ class Race:
         record = Record(None, {})
         for one in self.contenders:
             self._warm_up(one, 0, n_jobs, record)
+
+    def _check_models(self) -> None:
+        for one in self.contenders:
+            if options_of(one.model) is None:
+                raise InputError(
+                    f"the model of {one.name!r} has no label and options, by which resume could tell whether "
+                    "runs are its own: set both (options: what it depends on), or do not resume"
+                )
 
     @staticmethod
     def _file(store: str | os.PathLike[str] | None) -> Path | None:

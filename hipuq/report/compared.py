@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from hipuq.comparison.statistics import ROUNDING
 from hipuq.report.table import factor
 
 Array = NDArray[np.float64]
@@ -17,9 +18,6 @@ Flags = NDArray[np.bool_]
 
 LEVEL = 0.95
 """Level of the intervals of a contender that names none: the default of all methods."""
-
-ROUNDING = 1e-10
-"""Error by the size of the reference up to which an exact method has none."""
 
 SIGMAS = 3.0
 """Standard errors beyond which what is seen is no accident: in one of 740 cases, one-sided."""
