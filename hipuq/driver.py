@@ -7,8 +7,10 @@ from concurrent.futures import Executor
 from contextlib import AbstractContextManager
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
+from hipuq import schema
 from hipuq.errors import InputError, check_name
 from hipuq.evaluation import evaluate, together
 from hipuq.inputs import Inputs
@@ -128,11 +130,7 @@ def run(
     Dataset
         Results, as from `estimate`.
     """
-    _check_inputs(inputs)
-    _check_of(of)
-    record = method_named(method)
-    stages = record.split(options)
-    record.plan(inputs, n, [of], stages)
+    record, stages = check_arguments(inputs, method, n, of, options)
     outcomes = completed(
         model,
         inputs,
@@ -148,6 +146,34 @@ def run(
     return estimated(record, outcomes, inputs, of=of, **stages["estimate"])
 
 
+def check_arguments(
+    inputs: object, method: str, n: int, of: object, options: Mapping[str, Any]
+) -> tuple[Method, dict[str, dict[str, Any]]]:
+    """Return the method and its options by stage, once an analysis is known to be one that can be made.
+
+    Parameters
+    ----------
+    inputs, method, n, of, options
+        As in `run`.
+
+    Returns
+    -------
+    method : Method
+    stages : dict
+        Options by stage.
+
+    Raises
+    ------
+    InputError
+        If one of them cannot be used.
+    """
+    _check_of(of)
+    record = method_named(method)
+    stages = record.split(options)
+    record.plan(_check_inputs(inputs), n, [str(of)], stages)
+    return record, stages
+
+
 def completed(
     model: Callable[..., xr.Dataset],
     inputs: Inputs,
@@ -157,6 +183,8 @@ def completed(
     *,
     of: Sequence[str],
     stages: Mapping[str, Mapping[str, Any]],
+    fixed: Mapping[str, float] | None = None,
+    keep: Sequence[str] = (),
     n_jobs: int | None = None,
     executor: Executor | None = None,
     progress: bool | None = None,
@@ -176,6 +204,10 @@ def completed(
         Outcomes to analyse; the first one is what a sequential method looks at.
     stages : mapping
         Options by stage, as from `Method.split`.
+    fixed : mapping, optional
+        Parameters that are not uncertain -> the value that all samples get.
+    keep : sequence of str
+        Outcomes wanted besides.
     n_jobs, executor, progress
         As in `evaluate`.
 
@@ -186,8 +218,13 @@ def completed(
     """
 
     def evaluated(samples: xr.Dataset) -> xr.Dataset:
-        keep = with_bounds(of, model)
-        return evaluate(model, samples, keep=keep, n_jobs=n_jobs, executor=executor, progress=progress)
+        wanted = [*with_bounds(of, model), *(name for name in keep if name not in of)]
+        values = {
+            name: ("sample", np.full(samples.sizes["sample"], value), _attrs(name))
+            for name, value in (fixed or {}).items()
+        }
+        samples = samples.assign(values)
+        return evaluate(model, samples, keep=wanted, n_jobs=n_jobs, executor=executor, progress=progress)
 
     outcomes = evaluated(record.design(inputs, n, seed, **stages["design"]))
     number = 1
@@ -236,11 +273,17 @@ def with_bounds(of: Iterable[str], model: Callable[..., xr.Dataset]) -> list[str
     return [*names, *(name for name in bounds if name in known)]
 
 
+def _attrs(name: str) -> dict[str, Any]:
+    """Return the attributes of a parameter that all samples have alike."""
+    return schema.PARAMETERS[name].attrs if name in schema.PARAMETERS else {"long_name": name, "units": ""}
+
+
 def _check_of(of: object) -> None:
     if not isinstance(of, str):
         raise InputError(f"of is {of!r}: it must be the name of one outcome, such as 'margin'")
 
 
-def _check_inputs(inputs: object) -> None:
+def _check_inputs(inputs: object) -> Inputs:
     if not isinstance(inputs, Inputs):
         raise InputError(f"inputs is {type(inputs).__name__}: give hipuq.Inputs(...) or model.inputs(...)")
+    return inputs

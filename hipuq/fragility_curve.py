@@ -53,16 +53,11 @@ def fragility(outcomes: xr.Dataset, friction: ArrayLike, *, confidence: float = 
             f"friction is {grid}: it must ascend within the range that was swept, {lower} to {upper}"
         )
     known = outcomes["status"].values == schema.STATUS["ok"]
-    weight = outcomes["weight"].values if "weight" in outcomes.coords else np.ones(len(known))
-    weight = weight / weight.sum()
+    weight = weights_of(outcomes)
     unstable = _covered(outcomes["interval"].values[known], weight[known], grid, (lower, upper))
-    unknown = weight[~known].sum()
-    limits = [unstable, unstable + unknown]
-    drawn = not _enumerated(outcomes)
-    if drawn:
-        # Samples of unequal weight tell as much as this many of equal weight (Kish).
-        size = np.full(grid.size, 1.0 / np.square(weight).sum())
-        limits = [wilson(share * size, size, confidence)[end] for end, share in enumerate(limits)]
+    unknown = float(weight[~known].sum())
+    drawn = not enumerated(outcomes)
+    limits = share_limits(unstable, unknown, weight, confidence if drawn else None)
     values = {
         "probability": unstable / (1 - unknown) if known.any() else np.full(grid.size, np.nan),
         "probability_low": limits[0],
@@ -79,7 +74,46 @@ def fragility(outcomes: xr.Dataset, friction: ArrayLike, *, confidence: float = 
     return curve.assign_attrs(confidence=confidence if drawn else 1.0)
 
 
-def _enumerated(outcomes: xr.Dataset) -> bool:
+def weights_of(outcomes: xr.Dataset) -> Array:
+    """Return the weight of each sample, (samples,); all together 1.
+
+    Strata have as many samples each: the weight of its level is that of a sample up to a common factor.
+    """
+    size = outcomes.sizes["sample"]
+    weight = outcomes["weight"].values.astype(np.float64) if "weight" in outcomes.coords else np.ones(size)
+    return np.asarray(weight / weight.sum())
+
+
+def share_limits(
+    share: Array, unknown: float, weight: Array, confidence: float | None
+) -> tuple[Array, Array]:
+    """Return limits of a weighted share: the unknown is outside in the lower one, inside in the upper one.
+
+    Parameters
+    ----------
+    share : (k,) array
+        Weight of the samples inside, of all samples.
+    unknown : float
+        Weight of those of which it is not known.
+    weight : (samples,) array
+        As from `weights_of`.
+    confidence : float or None
+        Level of Wilson's interval; None where nothing was drawn.
+
+    Returns
+    -------
+    low, high : (k,) array
+    """
+    if confidence is None:
+        return share, np.minimum(share + unknown, 1.0)
+    # Samples of unequal weight tell as much as this many of equal weight (Kish).
+    size = np.full(share.shape, 1.0 / np.square(weight).sum())
+    low, _ = wilson(share * size, size, confidence)
+    _, high = wilson((share + unknown) * size, size, confidence)
+    return low, high
+
+
+def enumerated(outcomes: xr.Dataset) -> bool:
     """Say whether outcomes are those of every level of a discrete input alike, so that none was drawn."""
     if "weight" not in outcomes.coords or not outcomes.attrs.get("inputs"):
         return False

@@ -203,9 +203,9 @@ class FrictionIntegrated:
             for name in wanted
             if name in values
         }
-        if "interval" in data:
-            dims, array, attrs = data["interval"]
-            data["interval"] = (dims, array, {**attrs, "range": [self.lower, self.upper]})
+        for name in data.keys() & {"interval", "onset"}:
+            dims, array, attrs = data[name]
+            data[name] = (dims, array, {**attrs, "range": [self.lower, self.upper]})
         status = np.where(known, schema.STATUS["ok"], schema.STATUS["undecided"]).astype(np.int8)
         data["status"] = ("sample", status, schema.flag_attrs("status of the sample", schema.STATUS))
         proved = [CERTIFICATE if all(b.certified for b in one.boundaries) else STRUCTURED for one in cells]

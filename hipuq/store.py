@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import platform
 import shutil
 import warnings
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from importlib import metadata
 from pathlib import Path
 
 import xarray as xr
@@ -15,6 +17,19 @@ from hipuq.errors import StoreError
 
 RESULTS_NAME = "results.nc"
 """Name of the results file in an output folder."""
+
+
+PACKAGES = ("hipuq", "numpy", "scipy", "xarray", "chaospy", "SALib", "python-flint")
+"""Packages that numbers depend on."""
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that numbers depend on, as far as there are any."""
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        with suppress(metadata.PackageNotFoundError):
+            found[name] = metadata.version(name)
+    return found
 
 
 def save_results(results: xr.DataTree | xr.Dataset, path: str | os.PathLike[str]) -> None:

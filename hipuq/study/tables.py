@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+import itertools
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from hipuq.contact import ContactPatterns
-from hipuq.distributions import FAMILIES, from_family
+from hipuq.distributions import DISTRIBUTIONS, from_table
 from hipuq.errors import HipuqError, StudyError, unknown_name
 from hipuq.variation import relative, shift
 
@@ -29,11 +30,13 @@ class InputTable(BaseModel):
     Attributes
     ----------
     distribution : str
-        One of `hipuq.distributions.FAMILIES`, or ``"contact_patterns"``.
+        One of `hipuq.distributions.DISTRIBUTIONS`, or ``"contact_patterns"``.
     apply : str
         ``"absolute"``, ``"relative"`` (times 1 + draw) or ``"shift"`` (plus draw).
     each : str or None
         Dim of the elements that get a draw each.
+    source : str
+        Where the distribution comes from, for the report.
     """
 
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False, frozen=True)
@@ -41,6 +44,7 @@ class InputTable(BaseModel):
     distribution: str
     apply: Literal["absolute", "relative", "shift"] = "absolute"
     each: str | None = None
+    source: str = ""
 
     def distribution_for(self, parameter: str) -> object:
         """Return what ``model.inputs`` takes for a parameter.
@@ -62,12 +66,12 @@ class InputTable(BaseModel):
             if "in_contact" not in rest:
                 raise StudyError(f"input {parameter!r}: in_contact is missing")
             return ContactPatterns(**rest)
-        if self.distribution not in FAMILIES:
+        if self.distribution not in DISTRIBUTIONS:
             raise unknown_name(
-                f"distribution of input {parameter!r}", self.distribution, [*FAMILIES, CONTACT_PATTERNS]
+                f"distribution of input {parameter!r}", self.distribution, [*DISTRIBUTIONS, CONTACT_PATTERNS]
             )
         try:
-            drawn = from_family(self.distribution, rest)
+            drawn = from_table({"distribution": self.distribution, **rest})
         except HipuqError as error:
             raise StudyError(f"input {parameter!r}: {error}") from error
         if self.apply == "absolute":
@@ -94,6 +98,9 @@ class AnalysisTable(Table):
         Outcomes to analyse; a single one may stand alone.
     options : dict
         Options of the method.
+    over : dict
+        Parameter -> values at which the whole analysis is made, each with the same draws; it is then no
+        input of it, whatever the study says.
     preset, model, inputs
         What this analysis has in place of the study's.
     """
@@ -104,6 +111,7 @@ class AnalysisTable(Table):
     integrate_friction: bool = False
     of: list[str] = Field(min_length=1)
     options: dict[str, Any] = {}
+    over: dict[str, list[float]] = {}
     preset: str | None = None
     model: dict[str, Any] = {}
     inputs: dict[str, InputTable] = {}
@@ -131,6 +139,20 @@ class ReportTable(Table):
         Pairs of modes of the lock-in figure.
     mode_names : dict
         Mode -> the name it has in a publication.
+    headline : str or None
+        Analysis whose probability is the first thing told; the first one with such by default.
+    damping_ratio : float or None
+        Modal damping ratio that the headline assumes, one of those that its analysis is over.
+    damping_ratios : list of float
+        At which the probability is computed for the headline's model and inputs, where no analysis does.
+    damping_samples : int
+        Samples at each of them, at most those of the headline's analysis; 0 leaves it out.
+    targets : list of float
+        Probabilities for which a friction limit is told.
+    fragility_points : int
+        Frictions at which the fragility curve is computed.
+    literature : bool
+        Whether a study of hips sets beside its results what was measured in patients and on the bench.
     """
 
     friction_sweep: tuple[float, float] | None = None
@@ -139,6 +161,15 @@ class ReportTable(Table):
     shape_friction: float = 0.0
     pairs: list[tuple[int, int]] = []
     mode_names: dict[str, str] = {}
+    headline: str | None = None
+    damping_ratio: float | None = Field(default=None, ge=0)
+    damping_ratios: list[Annotated[float, Field(ge=0)]] = Field(
+        default=[0.0, 0.0025, 0.005, 0.0075, 0.01, 0.0125, 0.015, 0.0175, 0.02], min_length=1
+    )
+    damping_samples: int = Field(default=2048, ge=0, le=1_000_000)
+    targets: list[Annotated[float, Field(ge=0, lt=1)]] = Field(default=[0.01, 0.03, 0.1], min_length=1)
+    fragility_points: int = Field(default=201, ge=2, le=100_000)
+    literature: bool = True
 
     @field_validator("friction_sweep", mode="before")
     @classmethod
@@ -150,6 +181,13 @@ class ReportTable(Table):
     def _ascending(cls, value: tuple[float, float] | None) -> tuple[float, float] | None:
         if value is not None and not value[0] < value[1]:
             raise ValueError(f"the range {list(value)} must ascend")
+        return value
+
+    @field_validator("damping_ratios", "targets")
+    @classmethod
+    def _rising(cls, value: list[float]) -> list[float]:
+        if any(a >= b for a, b in itertools.pairwise(value)):
+            raise ValueError(f"the values {value} must ascend")
         return value
 
     @field_validator("pairs", mode="before")

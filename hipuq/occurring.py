@@ -1,0 +1,104 @@
+"""What occurs in outcomes: at which frequencies modes are unstable, and what decided the verdicts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from hipuq import schema
+from hipuq.errors import SchemaError
+from hipuq.fragility_curve import weights_of
+
+Array = NDArray[np.float64]
+
+LEVELS = (0.05, 0.5, 0.95)
+"""Shares of the unstable samples below the three frequencies of a mode."""
+
+FREQUENCIES = ("frequency_low", "frequency_median", "frequency_high")
+
+
+def frequency_ranges(outcomes: xr.Dataset) -> xr.Dataset:
+    """Return at which frequencies each mode is unstable.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+        With ``frequency`` [Hz] and ``unstable`` over (sample, mode), as from `evaluate`; samples of a
+        stratified design count by their weights.
+
+    Returns
+    -------
+    Dataset
+        ``frequency_low``, ``frequency_median``, ``frequency_high`` over ``mode`` [Hz]: the frequencies
+        below which 5, 50 and 95 % of the samples in which the mode is unstable lie (attribute ``levels``);
+        NaN for a mode that never is. ``unstable_samples`` is the number of them.
+
+    Raises
+    ------
+    SchemaError
+        If one of the two outcomes is missing.
+    """
+    for name in ("frequency", "unstable"):
+        if name not in outcomes or set(outcomes[name].dims) != {"sample", "mode"}:
+            raise SchemaError(f"frequency ranges need {name!r} over sample and mode: keep it in evaluate")
+    frequency, verdict = (outcomes[name].transpose("mode", "sample") for name in ("frequency", "unstable"))
+    unstable = (verdict.values == 1) & np.isfinite(frequency.values)
+    weight = weights_of(outcomes)
+    found = np.array(
+        [_quantiles(own[where], weight[where]) for own, where in zip(frequency.values, unstable, strict=True)]
+    )
+    data: dict[str, Any] = {}
+    for name, level, values in zip(FREQUENCIES, LEVELS, found.T, strict=True):
+        attrs = {
+            "long_name": f"frequency below which {100 * level:g} % of the unstable samples lie",
+            "units": "Hz",
+        }
+        data[name] = ("mode", values, attrs)
+    count = {"long_name": "samples in which the mode is unstable", "units": "1"}
+    data["unstable_samples"] = ("mode", unstable.sum(axis=1), count)
+    coords = {name: coord for name, coord in verdict.coords.items() if coord.dims == ("mode",)}
+    ranges = schema.stamp(xr.Dataset(data, coords=coords), "frequency ranges", like=outcomes.attrs)
+    return ranges.assign_attrs(levels=list(LEVELS))
+
+
+def _quantiles(values: Array, weight: Array) -> Array:
+    """Return the smallest values below or at which lie `LEVELS` of the weight; NaN without values."""
+    if not values.size:
+        return np.full(len(LEVELS), np.nan)
+    order = np.argsort(values, kind="stable")
+    share = np.cumsum(weight[order])
+    # Rounding must not leave the last quantile beyond the last value.
+    place = np.searchsorted(share / share[-1], np.array(LEVELS) - 1e-12)
+    return np.asarray(values[order][np.minimum(place, len(values) - 1)], np.float64)
+
+
+def verdict_counts(outcomes: xr.Dataset) -> xr.Dataset:
+    """Return how many samples have which status, and what decided those that have a verdict.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+        With ``status``, and ``decided_by`` where the model tells it.
+
+    Returns
+    -------
+    Dataset
+        ``samples`` over ``status`` and ``decided`` over ``decided_by``.
+    """
+    data: dict[str, Any] = {}
+    coords: dict[str, Any] = {}
+    tables = (
+        ("status", "samples", "samples of each status", schema.STATUS),
+        ("decided_by", "decided", "samples decided by each", schema.DECIDED_BY),
+    )
+    for dim, name, text, flags in tables:
+        if dim in outcomes:
+            flag = outcomes[dim].values
+            counts = np.array([(flag == value).sum() for value in flags.values()], np.int64)
+            data[name] = (dim, counts, {"long_name": text, "units": "1"})
+            attrs = {"long_name": "status" if dim == "status" else "decided by", "units": ""}
+            coords[dim] = (dim, np.array(list(flags)), attrs)
+    return schema.stamp(xr.Dataset(data, coords=coords), "verdict counts", like=outcomes.attrs)
