@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
+from plot_results import literature
 
 from hipuq import plots
 from hipuq.errors import InputError, SchemaError
@@ -235,3 +236,81 @@ def test_onset_distribution_refuses():
         plots.onset_distribution(outcomes([0.1]).isel(sample=0))
     with pytest.raises(SchemaError, match="-inf in sample 1"):
         plots.onset_distribution(outcomes([0.1, -np.inf]))
+
+
+# What was measured, and what is allowed
+
+
+CRITICAL = literature([0.03, 0.09, 0.12, 0.4], [0.02, np.nan, 0.11, 0.3], [0.04, np.nan, 0.13, 0.5])
+
+
+def test_critical_friction_is_marked_in_and_near_the_range():
+    ax = drawn(plots.fragility(curve(RISING), critical=CRITICAL))
+    marks = [shown for shown in ax.collections if shown.get_label().startswith("squeak set in")]
+    assert [float(shown.get_offsets()[0, 0]) for shown in marks[:-1]] == [0.03, 0.09, 0.12]
+    assert len({shown.get_paths()[0].vertices.tobytes() for shown in marks[:-1]}) == 3
+    ends = [(shown.get_x(), shown.get_x() + shown.get_width()) for shown in ax.patches]
+    np.testing.assert_allclose(ends, [(0.02, 0.04), (0.09, 0.09), (0.11, 0.13)])
+    assert labels(ax)[1:] == [
+        "squeak set in on the bench, source 0: 0.03 (0.02 to 0.04)",
+        "squeak set in on the bench, source 1: 0.09",
+        "squeak set in on the bench, source 2: 0.12 (0.11 to 0.13)",
+        "squeak set in on the bench at 0.4: beyond the range",
+    ]
+    # The next curve still takes the next style.
+    assert len(ax.lines) == 1
+
+
+def test_critical_friction_all_beyond_the_range():
+    ax = drawn(plots.fragility(curve(RISING), critical=literature([0.29, 0.39])))
+    assert labels(ax)[1:] == ["squeak set in on the bench at 0.29 to 0.39: beyond the range"]
+    assert ax.get_xlim()[1] < 0.11
+    with pytest.raises(SchemaError, match="critical needs 'value' over"):
+        plots.fragility(curve(RISING), critical=curve(RISING))
+
+
+def test_a_mapping_draws_several_curves():
+    ax = drawn(plots.fragility({"6": curve(RISING), "7": curve(RISING / 2)}, critical=CRITICAL, limit=0.05))
+    assert labels(ax)[:4:2] == ["6", "7"]
+    np.testing.assert_allclose(ax.lines[1].get_ydata(), 50 * RISING)
+    with pytest.raises(InputError, match="mapping"):
+        plots.fragility({})
+    with pytest.raises(InputError, match="mapping"):
+        plots.fragility({"6": curve(RISING)}, label="7")
+    assert labels(plots.fragility(curve(RISING, width=0.1, confidence=1.0))) == [
+        "probability, limits of the unknown"
+    ]
+
+
+def limits(values, low, high, targets=(0.05, 0.5), **attrs):
+    data = {"friction_limit": values, "friction_limit_low": low, "friction_limit_high": high}
+    said = {"units": "1", "range": [0.0, 0.1]}
+    return xr.Dataset(
+        {name: ("target", np.asarray(own, dtype=float), said) for name, own in data.items()},
+        coords={"target": list(targets)},
+        attrs={"confidence": 0.95} | attrs,
+    )
+
+
+def test_friction_limits_stand_at_their_targets():
+    given = limits([0.02, 0.05], [0.01, np.nan], [0.03, np.inf])
+    ax = drawn(plots.onset_distribution(outcomes([0.02, 0.05, 0.08, np.inf]), limits=given))
+    marks = [shown for shown in ax.collections if "not exceeded" in str(shown.get_label())]
+    np.testing.assert_allclose([shown.get_offsets()[0] for shown in marks], [(0.02, 5), (0.05, 50)])
+    bars = [shown.get_segments()[0][:, 0] for shown in ax.collections if shown.get_linewidth()[0] == 2.0][1:]
+    np.testing.assert_allclose(bars, [(0.01, 0.03), (0.0, 0.1)])
+    assert labels(ax)[2:] == [
+        "5 %: not exceeded up to friction 0.02 (95 % interval: 0.01 to 0.03)",
+        "50 %: not exceeded up to friction 0.05 (95 % interval: start to end)",
+    ]
+
+
+def test_friction_limits_that_are_none_are_told():
+    given = limits([np.inf, np.nan], [np.inf, np.nan], [np.inf, np.nan])
+    ax = drawn(plots.onset_distribution(outcomes([0.02, np.inf]), limits=given))
+    assert labels(ax)[2:] == [
+        "5 %: not exceeded up to friction 0.1",
+        "50 %: exceeded from the start of the range, or unknown",
+    ]
+    with pytest.raises(SchemaError, match="limits need 'friction_limit_low'"):
+        plots.onset_distribution(outcomes([0.02]), limits=given.drop_vars("friction_limit_low"))

@@ -94,8 +94,10 @@ def selected(variable: xr.DataArray) -> str:
 
 
 def level(results: xr.Dataset) -> str:
-    """Return what limits are, such as ``"95 % interval"``."""
+    """Return what limits are, such as ``"95 % interval"``; those of exact results bound what is unknown."""
     confidence = results.attrs.get("confidence")
+    if schema.is_exact(results):
+        return "limits of the unknown"
     return "interval" if confidence is None else f"{100 * float(confidence):g} % interval"
 
 
@@ -174,17 +176,24 @@ def say(ax: Axes, text: str) -> None:
     ax.text(0.5, 0.5, wrapped(ax, text, lines=LINES_OF_PART), transform=ax.transAxes, **style)
 
 
-def legend_below(ax: Axes, width: float = 1.9) -> None:
-    """Put the legend under the label of the x axis, which is there already, however high the Axes are.
+def legend_below(ax: Axes, width: float = 1.9, **options: Any) -> None:
+    """Put the legend under the label of the x axis, however high the Axes are.
+
+    Label and ticks are there already; each of their lines takes its room.
 
     Parameters
     ----------
     ax : Axes
     width : float
         Width of an entry [inch]: as many stand side by side as the Axes have room for, three at most.
+    **options
+        To ``ax.legend``, such as ``handles``.
     """
-    down = 32 + 12 * ax.get_xlabel().count("\n")
+    ticks = max((tick.get_text().count("\n") for tick in ax.get_xticklabels()), default=0)
+    down = 32 + 12 * (ax.get_xlabel().count("\n") + ticks)
     points = ScaledTranslation(0, -down / 72, ax.figure.dpi_scale_trans)
     columns = int(np.clip(inches(ax)[0] / width, 1, 3))
     style: dict[str, Any] = {"frameon": False, "fontsize": "small", "loc": "upper center"}
-    ax.legend(ncols=columns, bbox_to_anchor=(0.5, 0.0), bbox_transform=ax.transAxes + points, **style)
+    ax.legend(
+        ncols=columns, bbox_to_anchor=(0.5, 0.0), bbox_transform=ax.transAxes + points, **style, **options
+    )

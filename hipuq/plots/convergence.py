@@ -22,7 +22,7 @@ from hipuq.plots.captions import (
     wrapped,
 )
 from hipuq.plots.scales import label_decades
-from hipuq.plots.style import BLACK, GREY, LINES, axis_label, new_axes
+from hipuq.plots.style import BLACK, GREY, LINES, MARKERS, axis_label, new_axes
 
 Array = NDArray[np.float64]
 
@@ -32,9 +32,6 @@ FIRST = ("probability_overall", "probability", "mean_overall", "mean", "ST", "S1
 """Which quantity is drawn by default: the first of these that there is."""
 
 WAY_OUT = "results of the method 'monte_carlo' or 'sobol'"
-
-MARKERS = "o^sDvP"
-"""Markers by line style: they stand where estimates were made."""
 
 
 def convergence(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hipuq.cea import damping_ratio
 from hipuq.errors import InputError
 from hipuq.plots.friction_sweep import cluster
-from hipuq.plots.style import BORDER, COLOUR_MAP, GREY, SKY, STABLE, UNSTABLE, axis_label, new_axes
+from hipuq.plots.style import BORDER, GREY, SHADES, SKY, STABLE, UNSTABLE, axis_label, new_axes
 from hipuq.plots.tracking import growth_threshold, sorted_sweep
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ NEAR = (0.05, 0.06)
 
 
 def root_locus(outcomes: xr.Dataset, *, ax: Axes | None = None) -> Axes:
-    """Draw growth rate over frequency of all modes, coloured by friction.
+    """Draw growth rate over frequency of all modes, coloured by friction: the higher the darker.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def root_locus(outcomes: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     known = ~np.isnan(sweep["unstable"].values)
     close = cluster(frequency[0]) | cluster(frequency[-1])
     ax = new_axes(ax, 7.2, 4.8)
-    limits: dict[str, Any] = {"vmin": friction.min(), "vmax": friction.max(), "cmap": COLOUR_MAP}
+    limits: dict[str, Any] = {"vmin": friction.min(), "vmax": friction.max(), "cmap": SHADES}
 
     def draw(view: Axes, shown: NDArray[np.bool_]) -> PathCollection:
         view.axhline(growth_threshold(sweep), zorder=0.5, **BORDER)
@@ -126,8 +126,10 @@ def damping_over_frequency(
             inset.axvline(x, **UNKNOWN)
         inset.margins(0.12, 0.3)
         _frame(ax, inset, numbers[close])
-        _label(inset, numbers[drawn & close], frequency[drawn & close], ratio[drawn & close], beside=True)
-    _label(ax, numbers[drawn & ~close], frequency[drawn & ~close], ratio[drawn & ~close])
+        label_modes(
+            inset, numbers[drawn & close], frequency[drawn & close], ratio[drawn & close], beside=True
+        )
+    label_modes(ax, numbers[drawn & ~close], frequency[drawn & ~close], ratio[drawn & ~close])
     for x in frequency[unknown]:
         ax.axvline(x, **UNKNOWN)
     if unknown.any():
@@ -166,8 +168,18 @@ def _damping(ax: Axes, frequency: Array, ratio: Array, unstable: Array, shown: N
             ax.plot(frequency[part], ratio[part], markersize=5, label=label, **style)
 
 
-def _label(ax: Axes, numbers: NDArray[np.int64], x: Array, y: Array, *, beside: bool = False) -> None:
-    """Write mode numbers above points, or beside them; points that lie on each other share a label."""
+def label_modes(ax: Axes, numbers: NDArray[Any], x: Array, y: Array, *, beside: bool = False) -> None:
+    """Write mode numbers above points, or beside them; points that lie on each other share a label.
+
+    Parameters
+    ----------
+    ax : Axes
+        Its limits are set.
+    numbers, x, y : (modes,) array
+        Numbers of the modes, and where their points are.
+    beside : bool, default False
+        Whether to write to the right of a point.
+    """
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     u, v = (x - left) / (right - left), (y - bottom) / (top - bottom)
     groups: list[list[int]] = []

@@ -15,8 +15,9 @@ from matplotlib.figure import FigureBase
 from numpy.typing import NDArray
 
 from hipuq.errors import InputError, SchemaError
+from hipuq.plots.captions import level
+from hipuq.plots.grouping import check_values, patterns
 from hipuq.plots.style import BLACK, BLUE, VERMILLION, axis_label, new_axes, new_panels
-from hipuq.schema import is_exact
 
 NEEDED = ("probability_min", "probability_mean", "probability_max")
 LAST = 8
@@ -70,7 +71,7 @@ def occurrence(
     ax = new_axes(ax)
     _draw(ax, chosen, count, names or {}, _mean_label(results), beside)
     ax.set_title(_title(results, count))
-    ax.set_xlabel(_mode_label(chosen, names))
+    ax.set_xlabel(mode_label(chosen, names))
     ax.set_ylabel(_probability_label(results))
     # Room for the legend above 100 %, where no data can be.
     ax.set_ylim(-4, 120)
@@ -127,7 +128,7 @@ def occurrence_panels(
     for ax in axes.flat[len(counts) :]:
         ax.set_visible(False)
     parent = axes[0, 0].figure
-    parent.supxlabel(_mode_label(chosen, names), fontsize="medium")
+    parent.supxlabel(mode_label(chosen, names), fontsize="medium")
     parent.supylabel(_probability_label(results), fontsize="medium")
     legend: dict[str, Any] = {}
     for ax in axes.flat[: len(counts)]:
@@ -164,17 +165,8 @@ def _chosen(results: xr.Dataset, counts: Sequence[int], modes: Sequence[int] | N
     """Return the results of the modes to draw, once counts and modes are known to be there."""
     results = _checked(results)
     here = results["mode"].values.tolist()
-    wanted = here[-LAST:] if modes is None else list(modes)
-    for what, values, allowed in (
-        ("count", list(counts), results["count"].values.tolist()),
-        ("mode", wanted, here),
-    ):
-        if not values:
-            raise InputError(f"no {what} to draw: name at least one of {allowed}")
-        for value in values:
-            if value not in allowed:
-                raise InputError(f"{what} {value} is not in the results: it must be one of {allowed}")
-    return results.sel(mode=wanted)
+    check_values("count", counts, results["count"].values.tolist())
+    return results.sel(mode=check_values("mode", here[-LAST:] if modes is None else modes, here))
 
 
 def _draw(
@@ -218,7 +210,7 @@ def _draw(
     unknown = np.isnan(mean)
     for x in place[unknown]:
         ax.annotate("?", (x, 0.02), xycoords=("data", "axes fraction"), ha="center", va="bottom")
-    ax.set_xticks(place, [_tick(chosen, i, names) for i in range(len(place))])
+    ax.set_xticks(place, [mode_tick(chosen, i, names) for i in range(len(place))])
     ax.tick_params(axis="x", labelsize="small")
     ax.set_xlim(-0.6, len(place) - 0.4)
     ax.set_ylim(-4, 104)
@@ -233,15 +225,32 @@ def _draw_exact(ax: Axes, part: xr.Dataset) -> None:
     ax.plot(place, values, linestyle="none", zorder=3, label="exact", **bar)
 
 
-def _tick(chosen: xr.Dataset, place: int, names: Mapping[int, str]) -> str:
-    """Return the tick label of a mode: its pair, or its number, and the name in the source."""
+def mode_tick(chosen: xr.Dataset | xr.DataArray, place: int, names: Mapping[int, str]) -> str:
+    """Return the tick label of a mode: its pair, or its number, and the name in the source.
+
+    Parameters
+    ----------
+    chosen : Dataset or DataArray
+        With the coord ``mode`` and perhaps ``pair``.
+    place : int
+        Place of the mode in it.
+    names : mapping
+        Mode number -> name.
+
+    Returns
+    -------
+    str
+    """
     mode = int(chosen["mode"].values[place])
     label = str(chosen["pair"].values[place]) if "pair" in chosen.coords else str(mode)
     return f"{label}\n({names[mode]})" if mode in names else label
 
 
-def _mode_label(chosen: xr.Dataset, names: Mapping[int, str] | None) -> str:
-    label = "pair of modes, by ascending frequency" if "pair" in chosen.coords else "mode"
+def mode_label(chosen: xr.Dataset | xr.DataArray, names: Mapping[int, str] | None) -> str:
+    """Return the label of an axis of modes, see `mode_tick`."""
+    label = (
+        "pair of modes, by ascending frequency" if "pair" in chosen.coords else "mode, by ascending frequency"
+    )
     return f"{label} (name in the paper)" if names else label
 
 
@@ -252,15 +261,11 @@ def _probability_label(results: xr.Dataset) -> str:
 
 def _mean_label(results: xr.Dataset) -> str:
     """Return the legend of a mean with limits: what they are, where that is known."""
-    if is_exact(results):
-        return "mean, limits of the unknown"
-    level = results.attrs.get("confidence")
-    return "mean" if level is None else f"mean, {100 * float(level):g} % interval"
+    return f"mean, {level(results)}" if "confidence" in results.attrs else "mean"
 
 
 def _title(results: xr.Dataset, count: int) -> str:
     title = f"{count} in contact"
     if "in_contact" in results.coords:
-        patterns = int((results["in_contact"].values == count).sum())
-        title += f", {patterns} pattern{'' if patterns == 1 else 's'}"
+        title += f", {patterns(int((results['in_contact'].values == count).sum()))}"
     return title

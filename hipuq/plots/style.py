@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure, FigureBase
 from numpy.typing import NDArray
 
@@ -37,6 +39,22 @@ LINES: tuple[dict[str, Any], ...] = (
 )
 """Styles of lines, taken in turn."""
 
+MARKERS = "o^sDvP"
+"""Markers by line style: they stand where estimates were made."""
+
+FILLS: tuple[dict[str, Any], ...] = (
+    {"facecolor": SKY, "hatch": ""},
+    {"facecolor": ORANGE, "hatch": "//////"},
+    {"facecolor": GREEN, "hatch": "......"},
+    {"facecolor": PURPLE, "hatch": "xxxxxx"},
+    {"facecolor": "white", "hatch": "------"},
+    {"facecolor": VERMILLION, "hatch": "||||||"},
+)
+"""Fillings of boxes, taken in turn."""
+
+UNKNOWN: dict[str, Any] = {"facecolor": "#DDDDDD", "edgecolor": GREY, "hatch": "xxxxx", "linewidth": 0.0}
+"""Filling of areas of which nothing is known."""
+
 STABLE: dict[str, Any] = {"color": BLUE, "marker": "o", "linestyle": "none"}
 UNSTABLE: dict[str, Any] = {"color": VERMILLION, "marker": "^", "linestyle": "none"}
 UNDECIDED: dict[str, Any] = {"color": GREY, "marker": "o", "linestyle": "none", "markerfacecolor": "none"}
@@ -45,8 +63,13 @@ UNDECIDED: dict[str, Any] = {"color": GREY, "marker": "o", "linestyle": "none", 
 BORDER: dict[str, Any] = {"color": BLACK, "linewidth": 0.8, "linestyle": "--"}
 """Line between stable and unstable."""
 
-COLOUR_MAP = "cividis"
-"""Colours of a continuous variable: lightness rises all along."""
+SHADES = LinearSegmentedColormap.from_list(
+    "shades", colormaps["cividis"].reversed()(np.linspace(0.12, 1.0, 256))
+)
+"""Colours of a continuous variable: lightness falls all along, from one that still differs from paper."""
+
+PERCENT = ("damping_ratio", "damping_1", "damping_2")
+"""Parameters that are drawn in per cent."""
 
 
 def new_axes(ax: Axes | None, width: float = 6.4, height: float = 4.4) -> Axes:
@@ -115,3 +138,47 @@ def axis_label(variable: xr.DataArray, units: str | None = None) -> str:
     attrs = {"long_name": name} | known | variable.attrs
     unit = units if units is not None else attrs.get("units")
     return f"{attrs['long_name']} [{unit}]" if unit else str(attrs["long_name"])
+
+
+def scaled(variable: xr.DataArray) -> tuple[NDArray[np.float64], str]:
+    """Return values of a parameter as they are drawn, damping ratios in per cent, and the label of the axis.
+
+    Parameters
+    ----------
+    variable : DataArray
+        The parameter, by its name.
+
+    Returns
+    -------
+    values : array
+    label : str
+        ``"modal damping ratio of the frictionless modes [%]"``.
+    """
+    values = variable.values.astype(np.float64)
+    if variable.name in PERCENT:
+        return 100 * values, axis_label(variable, "%")
+    return values, axis_label(variable)
+
+
+def shades_of(probability: NDArray[np.float64], *, close: bool = False) -> Normalize:
+    """Return the scale of colours of probabilities [%]: 0 to 100, where all are small to a rounder number.
+
+    Parameters
+    ----------
+    probability : array
+        [%]; NaN where unknown.
+    close : bool, default False
+        Whether to take no more than the tens that hold them, to tell them apart.
+
+    Returns
+    -------
+    Normalize
+    """
+    most = float(np.nanmax(probability, initial=0.0))
+    if close and most > 10:
+        least, most = 10 * np.floor(np.nanmin(probability) / 10), 10 * np.ceil(most / 10)
+        return Normalize(float(min(least, most - 10)), float(most))
+    if most == 0 or most > 50:
+        return Normalize(0.0, 100.0)
+    power = 10.0 ** np.floor(np.log10(most))
+    return Normalize(0.0, float(next(step * power for step in (1, 2, 3, 5, 7.5, 10) if most <= step * power)))

@@ -9,6 +9,7 @@ the pairs that can lock in have all done so there, and have not yet passed each 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -152,6 +153,24 @@ def growth_threshold(outcomes: xr.Dataset) -> float:
     return float(model.get("growth_threshold", 0.0)) if isinstance(model, dict) else 0.0
 
 
+def check_constant(outcomes: xr.Dataset, varied: Sequence[str], why: str) -> None:
+    """Raise an InputError if a parameter differs between samples that is none of those meant to.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+    varied : sequence of str
+        Parameters that may differ.
+    why : str
+        Rest of the message.
+    """
+    for name in schema.PARAMETERS:
+        if name not in varied and name in outcomes.variables and "sample" in outcomes[name].dims:
+            values = outcomes[name].transpose("sample", ...).values
+            if (values != values[:1]).any():
+                raise InputError(f"{name} varies in the outcomes: {why}")
+
+
 def sorted_sweep(outcomes: xr.Dataset) -> xr.Dataset:
     """Return a checked sweep by ascending friction, without samples that have no frequencies.
 
@@ -175,11 +194,7 @@ def sorted_sweep(outcomes: xr.Dataset) -> xr.Dataset:
             raise SchemaError(f"the sweep needs {name!r}: outcomes of a friction sweep, all modes")
     if outcomes["friction"].dims != ("sample",):
         raise SchemaError(f"friction needs the dim 'sample' alone, it has {outcomes['friction'].dims}")
-    for name in schema.PARAMETERS:
-        if name != "friction" and name in outcomes and "sample" in outcomes[name].dims:
-            values = outcomes[name].transpose("sample", ...).values
-            if (values != values[:1]).any():
-                raise InputError(f"{name} varies in the outcomes: in a friction sweep only friction may")
+    check_constant(outcomes, ["friction"], "in a friction sweep only friction may")
     sweep = outcomes[["friction", *TRACKED]].transpose("sample", ...)
     if "mode" not in sweep.coords:
         sweep = sweep.assign_coords(mode=np.arange(1, sweep.sizes["mode"] + 1))
