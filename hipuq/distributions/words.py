@@ -55,7 +55,8 @@ def described(description: Mapping[str, Any]) -> str:
     'Normal(mu=0.0, sigma=2.0)'
     """
     if "components" in description:
-        return "; ".join(_component(part) for part in description["components"])
+        # What is never drawn is not told; all weights are 0 in no mixture.
+        return "; ".join(_component(part) for part in description["components"] if part["weight"] > 0)
     if "name" not in description:
         # Objects without a description of their own are known by their repr, which may have lines.
         return " ".join(str(description.get("text", "unknown")).split())
@@ -102,14 +103,14 @@ def sources(description: Mapping[str, Any]) -> dict[str, str]:
     Returns
     -------
     dict
-        Part -> its source, for the parts that have one: the regimes by name, and ``"lambda ratio"`` for
-        what their probabilities come from, together with that distribution in words.
+        Part -> its source, for the parts that have one and are drawn: the regimes by name, and
+        ``"lambda ratio"`` for what their probabilities come from, together with that distribution in words.
     """
     found = {}
     ratio = description.get("lambda_ratio")
     if ratio:
         found[LAMBDA_RATIO] = f"{ratio['text']}: {ratio['source']}"
-    found |= {one.name: one.source for one in regimes(description) if one.source}
+    found |= {one.name: one.source for one in regimes(description) if one.source and one.weight > 0}
     return found
 
 

@@ -22,6 +22,10 @@ ROOM = 0.84
 """Share of the place of a mode that its boxes fill."""
 
 
+HALF = 50.0
+"""Probability [%] from which on the axis reaches to 100."""
+
+
 def boxplots(
     results: xr.Dataset,
     *,
@@ -78,13 +82,21 @@ def boxplots(
     ax.set_xticks(place, [mode_tick(chosen, i, names or {}) for i in range(len(place))])
     ax.tick_params(axis="x", labelsize="small", length=0)
     ax.set_xlim(-0.5, len(place) - 0.5)
-    ax.set_ylim(-4, 104)
+    # All of 0 to 100 % where there is much, else boxes would be lines.
+    top = 100.0 if (largest := _largest(values)) > HALF else max(largest, 1.0)
+    ax.set_ylim(-0.04 * top, 1.04 * top)
     ax.grid(axis="y", linewidth=0.4, alpha=0.5)
     ax.set_axisbelow(True)
     ax.set_xlabel(mode_label(chosen, names))
     ax.set_ylabel(wrapped(ax, axis_label(probability, "%"), upright=True))
     legend_below(ax, width=2.4, handles=handles)
     return ax
+
+
+def _largest(values: Array) -> float:
+    """Return the largest value; 0 where none is known."""
+    known = values[~np.isnan(values)]
+    return float(known.max()) if known.size else 0.0
 
 
 def _modes(
