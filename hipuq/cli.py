@@ -93,12 +93,18 @@ def report(results: Annotated[Path, typer.Argument(help="Output folder or its re
 
 
 @app.command()
-def show(results: Annotated[Path, typer.Argument(help="Output folder or its results.nc.")]) -> None:
+def show(
+    results: Annotated[Path, typer.Argument(help="Output folder or its results.nc.")],
+    analysis: Annotated[
+        str | None, typer.Option("--analysis", help="Show the tables of this analysis in full.")
+    ] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Show those of every analysis.")] = False,
+) -> None:
     """Show results in one screen of text."""
     from hipuq.report.text import show_results
     from hipuq.store import load_results
 
-    show_results(load_results(results))
+    show_results(load_results(results), analysis=analysis, everything=everything)
 
 
 @app.command()

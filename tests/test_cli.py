@@ -25,6 +25,7 @@ friction_points = 21
 shape_friction = 0.1
 mode_shapes = [18]
 pairs = [[17, 18]]
+damping_samples = 0
 """
 )
 

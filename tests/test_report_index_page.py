@@ -119,7 +119,7 @@ def test_pictures_of_results_as_they_are_made(made):
 
 def test_words_of_results_as_they_are_made(made, tmp_path):
     stream = io.StringIO()
-    show_results(made, Console(file=stream, width=300))
+    show_results(made, Console(file=stream, width=300), everything=True)
     text = stream.getvalue()
     for analysis, method in (("drawn", "sobol"), ("fitted", "chaos"), ("modes", "sobol")):
         results = next(iter(made[analysis].children.values())).to_dataset()

@@ -22,7 +22,7 @@ OF_SURROGATE = (
 def shown(results):
     """Return the lines that are printed of results."""
     stream = io.StringIO()
-    show_results(tree(one=results), Console(file=stream, width=200))
+    show_results(tree(one=results), Console(file=stream, width=200), analysis="one")
     return stream.getvalue().splitlines()
 
 
@@ -300,7 +300,7 @@ def test_no_mode_has_any():
 
 def test_screen_of_sobol_indices():
     lines = shown(sobol())
-    assert lines[2] == "one: ring, sobol, seed 1"
+    assert lines[1] == "one: ring, sobol, seed 1"
     assert SENTENCE in " ".join(lines)
     assert any(line.split()[:2] == ["friction", "0.470"] for line in lines)
 
@@ -321,4 +321,4 @@ def test_screen_of_modes_and_of_nothing():
 
 def test_results_of_indices_alone_are_found():
     bare = sobol()[["S1", "ST", "evaluations", "failed", "undecided", "seconds"]]
-    assert [of for of, _ in estimates(tree(one=bare), "one")] == ["margin"]
+    assert [of for of, _ in estimates({"margin": bare})] == ["margin"]

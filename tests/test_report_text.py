@@ -11,7 +11,7 @@ from rich.console import Console
 import hipuq
 from hipuq.report.page import content, write_report
 from hipuq.report.partners import comparison, groups_of
-from hipuq.report.summary import bounded, headline, inputs_table, tables
+from hipuq.report.summary import analyses, bounded, headline, inputs_table, tables
 from hipuq.report.text import show_results
 
 STUDY = (
@@ -30,6 +30,8 @@ n = 1
 integrate_friction = true
 of = ["probability", "probability_by_mode"]
 options = { stratify = "contact" }
+[report]
+damping_samples = 0
 """
 )
 
@@ -47,18 +49,20 @@ def exact(tree):
 
 
 def shown(tree):
-    """Return what is printed of each analysis."""
-    stream = io.StringIO()
-    show_results(tree, Console(file=stream, width=100))
-    _, *parts = stream.getvalue().split("\n\n")
-    return dict(zip(tree.children, parts, strict=True))
+    """Return what is printed of each analysis in full."""
+    found = {}
+    for name in analyses(tree):
+        stream = io.StringIO()
+        show_results(tree, Console(file=stream, width=100), analysis=name)
+        found[name] = stream.getvalue().strip()
+    return found
 
 
 def test_exact_results_have_neither_seed_nor_interval(tree):
     text = shown(tree)
     assert "seed" in text["drawn"]
     assert "interval" in text["drawn"]
-    assert text["certain"].splitlines()[0].endswith(", exact")
+    assert text["certain"].splitlines()[0].endswith(", no damping, exact")
     for word in ("seed", "interval", "bounds", "100%"):
         assert word not in text["certain"]
 
@@ -144,7 +148,7 @@ def test_the_page_says_the_same(tree):
 
 def test_the_page_of_exact_results(tree, tmp_path):
     page = write_report(tree, tmp_path).read_text(encoding="utf-8")
-    part = page[page.index("<h2>certain") : page.index("<h2>How to read")]
+    part = page[page.index('id="analysis-certain"') : page.index('id="reading"')]
     assert "no sampling error. Friction is integrated: " in part
     for word in ("Intervals", "100%", "seed", "Bounds"):
         assert word not in part

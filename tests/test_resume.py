@@ -165,7 +165,7 @@ def test_what_the_report_shows_is_made_again_where_it_changes(monkeypatch, tmp_p
     assert counted[0] == 2
     stored = hipuq.load_results(folder / "out")
     assert stored["b/friction_sweep"].sizes["sample"] == 21
-    assert list(stored["a"].children) == ["any_unstable", "margin", "friction_sweep"]
+    assert list(stored["a"].children) == ["any_unstable", "margin", "verdicts", "friction_sweep"]
     assert "friction_sweep" not in run(folder, f'title = "Shown"\n{ANALYSES}', resume=True)["a"].children
 
 

@@ -25,6 +25,7 @@ SIZES = {
     "monte_carlo_integrated_damped": 8,
     "sobol_integrated_damped": 4,
     "chaos_integrated_damped": 12,
+    "damping_sweep": 64,
 }
 
 ENDS = "", "_low", "_high"

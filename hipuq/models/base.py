@@ -19,6 +19,17 @@ from hipuq.variation import Nominal
 
 Array = NDArray[np.float64]
 
+LINEAR = (
+    "The analysis is linear, about steady sliding: it tells whether a vibration begins to grow, neither how "
+    "large it becomes nor whether it can be heard",
+    "Unstable means a growth rate above the threshold, however small: a mode that grows slowly counts as one "
+    "that grows fast",
+    "What damps the vibration decides slow growth: a probability holds for the damping that it was computed "
+    "with alone",
+    "Friction is Coulomb's, with one coefficient that neither speed nor time changes",
+)
+"""Limits of every complex eigenvalue analysis with friction, a sentence each without a full stop."""
+
 
 class CEAModel(ABC):
     """A parametric set of matrices, solved by complex eigenvalue analysis.
@@ -37,9 +48,12 @@ class CEAModel(ABC):
         Name -> `Parameter`, all known to the schema.
     outcomes : tuple of str
         Names of the outcomes that a call can give.
+    limits : tuple of str
+        What its results do not tell, a sentence each without a full stop.
     """
 
     name: ClassVar[str]
+    limits: ClassVar[tuple[str, ...]] = LINEAR
     outcomes: ClassVar[tuple[str, ...]] = (*schema.OUTCOMES, "status", "decided_by")
 
     def __init__(

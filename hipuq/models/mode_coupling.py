@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from scipy.special import cosdg, sindg
 
 from hipuq.cea import Pencils
 from hipuq.errors import InputError, check_name
-from hipuq.models.base import CEAModel
+from hipuq.models.base import LINEAR, CEAModel
 from hipuq.models.parameter import Parameter
 
 Array = NDArray[np.float64]
@@ -44,6 +45,9 @@ PRESETS: dict[str, dict[str, float]] = {
 }
 """Nominal values: unit mass, stiffness [N/m], angles [deg], frequencies [Hz], damping ratios [1]."""
 
+LIMITS = ("Two modes show how friction couples them; they stand for no implant",)
+"""Limits of both models."""
+
 _POSITIVE = ("k1", "k2", "k3", "frequency_1", "frequency_2")
 _NOT_NEGATIVE = ("damping_1", "damping_2")
 
@@ -52,6 +56,7 @@ class Hoffmann(CEAModel):
     """Unit mass on two inclined springs with frictional contact (Hoffmann et al. 2002)."""
 
     name = "two_dof"
+    limits: ClassVar[tuple[str, ...]] = (*LIMITS, *LINEAR)
 
     @property
     def dofs(self) -> int:
@@ -88,6 +93,7 @@ class Hulten(CEAModel):
     """Two damped modes coupled by friction (Hulten 1993; Sinou and Jezequel 2007)."""
 
     name = "two_dof"
+    limits: ClassVar[tuple[str, ...]] = (*LIMITS, *LINEAR)
 
     @property
     def dofs(self) -> int:

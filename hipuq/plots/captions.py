@@ -17,6 +17,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from hipuq import schema
 from hipuq.errors import SchemaError
+from hipuq.plots.style import PERCENT
 
 UNDEFINED = "undefined"
 """What stands where a value does not exist."""
@@ -90,7 +91,16 @@ def parameter_label(name: str) -> str:
 
 def selected(variable: xr.DataArray) -> str:
     """Return what a variable was selected at, such as ``"mode 16"``; empty if nothing was."""
-    return ", ".join(f"{name} {coord.item()}" for name, coord in variable.coords.items() if coord.ndim == 0)
+    return ", ".join(
+        f"{parameter_label(str(name))} {_value(str(name), coord.item())}"
+        for name, coord in variable.coords.items()
+        if coord.ndim == 0
+    )
+
+
+def _value(name: str, value: object) -> str:
+    """Return the value of a coordinate, damping ratios in per cent."""
+    return f"{100 * value:.6g} %" if name in PERCENT and isinstance(value, float) else str(value)
 
 
 def level(results: xr.Dataset) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from hipuq.comparison.statistics import ROUNDING
-from hipuq.report.table import factor
+from hipuq.report.table import factor, listed
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -187,12 +187,6 @@ def another_model(race: xr.Dataset, where: Flags) -> str:
     who = [name for name, here in zip(names_of(race), where, strict=True) if here.any()]
     said = f"{listed(who)} {'evaluates' if len(who) == 1 else 'evaluate'} another model"
     return ", ".join(filter(None, [said, longer(race, where)]))
-
-
-def listed(parts: Iterable[str]) -> str:
-    """Return words as a list, such as ``a, b and c``."""
-    *first, last = parts
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def at_budgets(race: xr.Dataset, flags: Flags, among: Flags) -> str:

@@ -21,14 +21,13 @@ from hipuq.report.compared import (
     budgets_of,
     entries,
     extras_of,
-    listed,
     lowest,
     names_of,
     parts_of,
     undefined,
     values,
 )
-from hipuq.report.table import Table, significant, with_unit
+from hipuq.report.table import Table, listed, significant, with_unit
 
 OPEN = 0.2
 """Half the width of the reference's limits, over the lowest error, from which on it is said."""

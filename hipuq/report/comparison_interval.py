@@ -13,12 +13,11 @@ from hipuq.report.compared import (
     at_budgets,
     budgets_of,
     level_of,
-    listed,
     names_of,
     span,
     values,
 )
-from hipuq.report.table import MISSING, Table, percent
+from hipuq.report.table import MISSING, Table, listed, percent
 
 NARROW = 1.6
 """Shares of misses, over the stated one, above which intervals are called too narrow: 8 % for 5 %."""

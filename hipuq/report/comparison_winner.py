@@ -11,7 +11,6 @@ from hipuq.report.compared import (
     another_model,
     baseline_of,
     budgets_of,
-    listed,
     longer,
     lowest,
     marks,
@@ -20,7 +19,7 @@ from hipuq.report.compared import (
     rounding_of,
     values,
 )
-from hipuq.report.table import Table, duration, significant, with_unit
+from hipuq.report.table import Table, duration, listed, significant, with_unit
 
 NOTHING = "-"
 """What stands where there is nothing to tell."""

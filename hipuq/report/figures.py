@@ -2,61 +2,23 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 
-import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hipuq import plots
-from hipuq.report.compared import baseline_of
-from hipuq.report.partners import exact_of, groups_of, summed_up
+from hipuq.report.damping import at_damping
+from hipuq.report.method_figures import by_method, compared
+from hipuq.report.partners import exact_of, summed_up
+from hipuq.report.picture import Picture, figure_of
+from hipuq.report.reading import DAMPING, Reading
+from hipuq.report.squeak_figures import first_pictures
 from hipuq.report.summary import COMPARE, comparisons
 from hipuq.schema import is_exact
 
-SETTLING = ("probability_overall", "probability", "mean_overall", "mean", "S1", "ST")
-"""Estimates whose convergence is shown."""
-
-DRAWN: dict[tuple[str, tuple[str, ...], tuple[str, ...]], tuple[Callable[[xr.Dataset], Axes], str]] = {
-    ("indices", ("S1", "ST"), ("parameter",)): (
-        plots.index_bars,
-        "Sobol indices: the share of the variance that each parameter explains alone (first order) and "
-        "with its interactions (total order).",
-    ),
-    ("second_order", ("S2",), ("parameter", "parameter_2")): (
-        plots.second_order,
-        "Second-order Sobol indices: the share of the variance that the interaction of each pair explains.",
-    ),
-    ("surrogate", ("true", "predicted"), ("held_out",)): (
-        plots.predicted_against_true,
-        "The surrogate against the model, on samples that it was not fitted to.",
-    ),
-}
-"""Name of a figure, the variables that it needs and their dims -> what draws it, its caption."""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A figure of a report.
-
-    Attributes
-    ----------
-    analysis : str
-        The analysis that it belongs to, or ``compare/<problem>``.
-    name : str
-        Name of its file.
-    caption : str
-        What it shows, in a sentence or two.
-    figure : Figure
-    """
-
-    analysis: str
-    name: str
-    caption: str
-    figure: Figure
+BY_MODE = {"count", "mode"}
+"""Dims of what is summed up by number in contact and mode."""
 
 
 def pictures(tree: xr.DataTree) -> Iterator[Picture]:
@@ -71,31 +33,55 @@ def pictures(tree: xr.DataTree) -> Iterator[Picture]:
     ------
     Picture
     """
-    options = json.loads(tree.attrs.get("report", "{}"))
-    names = {int(mode): name for mode, name in options.get("mode_names", {}).items()}
-    found = groups_of(tree)
-    by_mode = {"count", "mode"}
-    sampled = {
-        name: groups["unstable"]
+    reading = Reading(tree)
+    drawn = set()
+    for picture in first_pictures(reading):
+        drawn.add((picture.analysis, picture.name))
+        yield picture
+    found = reading.found
+    exact = {
+        name: exact_of(groups["unstable"], found)
         for name, groups in found.items()
-        if summed_up(groups.get("unstable"), by_mode)
+        if summed_up(groups.get("unstable"), BY_MODE)
     }
-    exact = {name: exact_of(results, found) for name, results in sampled.items()}
     for analysis, groups in found.items():
-        if analysis in sampled:
-            other = exact[analysis]
-            beside = None if other is None else found[other]["probability_by_mode"]
-            yield _occurrence(analysis, sampled[analysis], names, other, beside)
-        elif summed_up(groups.get("probability_by_mode"), by_mode) and analysis not in exact.values():
-            yield _occurrence(analysis, groups["probability_by_mode"], names)
-        if "mode_shapes" in groups:
-            yield _mode_shapes(analysis, groups["mode_shapes"], options, names)
-        if "friction_sweep" in groups:
-            yield from _sweep(analysis, groups["friction_sweep"], options)
+        yield from _swept(reading, analysis)
+        yield from _by_mode(reading, analysis, exact)
+        if "mode_shapes" in groups and reading.alike(analysis, "mode_shapes") is None:
+            yield _mode_shapes(analysis, groups["mode_shapes"], reading)
+        if "friction_sweep" in groups and reading.alike(analysis, "friction_sweep") is None:
+            yield from _sweep(analysis, groups["friction_sweep"], reading.report.get("pairs", []))
         for of, results in groups.items():
-            yield from _by_method(analysis, of, results)
+            yield from by_method(analysis, of, results, [name for own, name in drawn if own == analysis])
     for problem, race in comparisons(tree):
-        yield from _comparison(f"{COMPARE}/{problem}", race)
+        yield from compared(f"{COMPARE}/{problem}", race)
+
+
+def _swept(reading: Reading, analysis: str) -> Iterator[Picture]:
+    """Give the probability over one or two swept parameters; that over damping is in the first part."""
+    results = reading.squeak(analysis)
+    parameters = list(reading.assumed[analysis])
+    if results is None or parameters == [DAMPING] or len(parameters) not in (1, 2):
+        return
+    whole = reading.whole[analysis][str(results.attrs["of"])]
+    said = " and ".join(name.replace("_", " ") for name in parameters)
+    if len(parameters) == 1:
+        name, ax = "probability_over", plots.probability_over(whole)
+    else:
+        name, ax = "stability_map", plots.stability_map(whole, *parameters)
+    yield Picture(analysis, name, f"Probability of instability over {said}.", figure_of(ax))
+
+
+def _by_mode(reading: Reading, analysis: str, exact: dict[str, str | None]) -> Iterator[Picture]:
+    """Give how often each mode is unstable; exact results stand beside sampled ones where there are both."""
+    groups = reading.found[analysis]
+    names = {int(mode): name for mode, name in reading.mode_names.items()}
+    if analysis in exact:
+        other = exact[analysis]
+        beside = None if other is None else reading.found[other]["probability_by_mode"]
+        yield _occurrence(analysis, groups["unstable"], names, other, beside)
+    elif summed_up(results := groups.get("probability_by_mode"), BY_MODE) and analysis not in exact.values():
+        yield _occurrence(analysis, results, names)
 
 
 def _occurrence(
@@ -123,24 +109,23 @@ def _occurrence(
     return Picture(analysis, "occurrence", caption, figure)
 
 
-def _mode_shapes(
-    analysis: str, shapes: xr.Dataset, options: dict[str, list[int]], names: dict[int, str]
-) -> Picture:
-    modes = options["mode_shapes"]
+def _mode_shapes(analysis: str, shapes: xr.Dataset, reading: Reading) -> Picture:
+    modes, names = reading.report["mode_shapes"], reading.mode_names
     figure = Figure(figsize=(6 * len(modes), 4.2), layout="constrained")
     for mode, ax in zip(modes, figure.subplots(1, len(modes), squeeze=False)[0], strict=True):
         plots.mode_shape(shapes, mode, ax=ax)
-    called = [f"mode {mode} is published as mode {names[mode]}" for mode in modes if mode in names]
-    friction = options["shape_friction"]
+    called = [f"mode {mode} is published as mode {names[str(mode)]}" for mode in modes if str(mode) in names]
+    friction = reading.report["shape_friction"]
     caption = f"Mode shapes over the undeformed ring, all oscillators in contact, friction {friction}."
     return Picture(
         analysis, "mode_shapes", caption + (f" Here {'; '.join(called)}." if called else ""), figure
     )
 
 
-def _sweep(analysis: str, sweep: xr.Dataset, options: dict[str, list[tuple[int, int]]]) -> Iterator[Picture]:
-    at = "at nominal values over the friction coefficient"
-    pairs = [(int(a), int(b)) for a, b in options["pairs"]]
+def _sweep(analysis: str, sweep: xr.Dataset, chosen: list[list[int]]) -> Iterator[Picture]:
+    where = f", {words}" if (words := at_damping(sweep)) else ""
+    at = f"at nominal values{where} over the friction coefficient"
+    pairs = [(int(a), int(b)) for a, b in chosen]
     if pairs:
         figure = Figure(figsize=(5.5 * len(pairs), 7), layout="constrained")
         plots.lock_in(sweep, pairs, figure=figure)
@@ -167,48 +152,3 @@ def _sweep(analysis: str, sweep: xr.Dataset, options: dict[str, list[tuple[int, 
         "negative one belongs to a growing mode.",
         figure,
     )
-
-
-def _by_method(analysis: str, of: str, results: xr.Dataset) -> Iterator[Picture]:
-    """Give indices, surrogate against model and convergence of a scalar outcome, as far as there are any."""
-    dims = {str(name): set(values.dims) for name, values in results.data_vars.items()}
-    for (name, needed, over), (draw, caption) in DRAWN.items():
-        # Pairs take two parameters.
-        enough = all(results.sizes.get(dim, 0) >= len(over) for dim in over)
-        if enough and all(dims.get(key) == set(over) for key in needed):
-            figure = draw(results).figure
-            assert isinstance(figure, Figure)
-            yield Picture(analysis, f"{name}_{of}", caption, figure)
-    settling = [
-        name for name in SETTLING if dims.get(f"{name}_by_budget") in ({"budget"}, {"budget", "parameter"})
-    ]
-    if settling:
-        figure = Figure(figsize=(6.4 * len(settling), 4.4), layout="constrained")
-        for quantity, ax in zip(settling, figure.subplots(1, len(settling), squeeze=False)[0], strict=True):
-            plots.convergence(results, ax=ax, quantity=quantity)
-        caption = "Convergence: the estimate from the first evaluations alone, over their number."
-        yield Picture(analysis, f"convergence_{of}", caption, figure)
-
-
-def _comparison(group: str, race: xr.Dataset) -> Iterator[Picture]:
-    """Give error over cost, coverage and the cost of accuracy, as far as there are any."""
-    if np.isfinite(race["rmse"]).any():
-        figure = Figure(figsize=(12, 5.2), layout="constrained")
-        for cost, ax in zip(("evaluations", "seconds"), figure.subplots(1, 2), strict=True):
-            plots.error_over_cost(race, ax=ax, cost=cost)
-        caption = "Error of each contender over its evaluations and over the time of a run."
-        yield Picture(group, "error", caption, figure)
-    if np.isfinite(race["coverage"]).any():
-        figure = Figure(figsize=(8, 5), layout="constrained")
-        plots.coverage(race, ax=figure.subplots())
-        caption = "Share of the intervals that hold the reference, over evaluations."
-        yield Picture(group, "coverage", caption, figure)
-    others = race["method"] != baseline_of(race)
-    if np.isfinite(race["cost_ratio"].where(others)).any():
-        figure = Figure(figsize=(8, 5), layout="constrained")
-        plots.cost_of_accuracy(race, ax=figure.subplots())
-        caption = (
-            "What accuracy costs: the time of each contender over that which the baseline, "
-            f"{baseline_of(race)!r}, takes for the same error."
-        )
-        yield Picture(group, "cost", caption, figure)

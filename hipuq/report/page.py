@@ -15,8 +15,11 @@ from hipuq import schema
 from hipuq.errors import StoreError
 from hipuq.report import comparison as methods
 from hipuq.report.comparison_winner import winner_words
+from hipuq.report.damping import label
 from hipuq.report.figures import pictures
-from hipuq.report.partners import comparison, groups_of
+from hipuq.report.first_part import blocks
+from hipuq.report.partners import comparison
+from hipuq.report.reading import Reading
 from hipuq.report.sensitivity import has_indices, note, remarks
 from hipuq.report.summary import (
     COMPARE,
@@ -29,9 +32,13 @@ from hipuq.report.summary import (
     tables,
     trust,
 )
+from hipuq.report.sweeps import assumed_words, sweep_table
 
 RESOLUTION = 130
 """Dots per inch of the pictures."""
+
+BROAD = 8.5
+"""Width [inch] above which a picture of the first part stands by itself."""
 
 WIDE = 10.5
 """Width [inch] above which a picture is shown larger where the screen is small."""
@@ -70,9 +77,10 @@ def write_report(tree: xr.DataTree, folder: str | os.PathLike[str]) -> Path:
             name = f"{picture.analysis.replace('/', '-')}-{picture.name}.png"
             (target / "figures" / name).write_bytes(buffer.getvalue())
             data = base64.b64encode(buffer.getvalue()).decode("ascii")
-            kind = "wide" if picture.figure.get_figwidth() > WIDE else ""
+            width = picture.figure.get_figwidth()
+            kind = "wide" if width > WIDE else "broad" if width > BROAD else ""
             image = {"data": data, "caption": picture.caption, "kind": kind}
-            images.setdefault(picture.analysis, []).append(image)
+            images.setdefault(f"#{picture.block}" if picture.block else picture.analysis, []).append(image)
         environment = jinja2.Environment(
             loader=jinja2.PackageLoader("hipuq.report", "."),
             autoescape=True,
@@ -93,46 +101,20 @@ def content(tree: xr.DataTree, images: dict[str, list[dict[str, str]]]) -> dict[
     ----------
     tree : DataTree
     images : dict
-        Pictures by analysis, or ``compare/<problem>``.
+        Pictures by analysis, ``compare/<problem>``, or ``#<block>`` of the first part.
 
     Returns
     -------
     dict
         Variables of the template.
     """
-    names = json.loads(tree.attrs.get("report", "{}")).get("mode_names", {})
-    sections, indices = [], False
-    groups = groups_of(tree)
-    for analysis in groups:
-        found = dict(estimates(tree, analysis))
-        if not found:
-            continue
-        indices = indices or any(map(has_indices, found.values()))
-        first = next(iter(found.values()))
-        sections.append(
-            {
-                "name": analysis,
-                "attrs": first.attrs,
-                "trust": trust(first),
-                "headlines": [line for line in map(headline, found.values()) if line],
-                "note": note(first),
-                "remarks": [
-                    f"{of}: {line}" if len(found) > 1 else line
-                    for of, one in found.items()
-                    for line in remarks(one)
-                ],
-                "inputs": inputs_table(first),
-                "tables": [table for results in found.values() for table in tables(results, names)],
-                "images": images.get(analysis, []),
-                "exact": schema.is_exact(first),
-                "integrated": bool(integrated(first)),
-                "bounded": any(
-                    "probability" in one and bounded(one, "probability") for one in found.values()
-                ),
-                "comparison": comparison(analysis, groups),
-                "confidence": f"{first.attrs['confidence']:.0%}",
-            }
-        )
+    reading = Reading(tree)
+    sections = [
+        section(reading, analysis) | {"images": images.get(analysis, [])}
+        for analysis in reading.found
+        if any(True for _ in estimates(reading.found[analysis]))
+    ]
+    first = [{"block": one, "images": images.get(f"#{one.key}", [])} for one in blocks(reading)]
     races = [
         {
             "name": problem,
@@ -146,4 +128,61 @@ def content(tree: xr.DataTree, images: dict[str, list[dict[str, str]]]) -> dict[
         }
         for problem, race in comparisons(tree)
     ]
-    return {"study": tree.attrs, "sections": sections, "comparisons": races, "indices": indices}
+    return {
+        "study": tree.attrs,
+        "first": first,
+        "sections": sections,
+        "comparisons": races,
+        "indices": any(one["indices"] for one in sections),
+    }
+
+
+def section(reading: Reading, analysis: str) -> dict[str, Any]:
+    """Return what the page shows of an analysis, a sweep at the value that the headline assumes.
+
+    Parameters
+    ----------
+    reading : Reading
+    analysis : str
+
+    Returns
+    -------
+    dict
+        Variables of the template.
+    """
+    found = dict(estimates(reading.found[analysis]))
+    first = next(iter(found.values()))
+    sources = json.loads(reading.tree.attrs.get("sources") or "{}").get(analysis, {})
+    made = [table for results in found.values() for table in tables(results, reading.mode_names)]
+    return {
+        "name": analysis,
+        "label": label(first),
+        "attrs": first.attrs,
+        "trust": trust(first),
+        "swept": [table for of in found if (table := sweep_table(reading, analysis, of)) is not None],
+        "assumed": assumed_words(reading, analysis),
+        "headlines": [line for line in map(headline, found.values()) if line],
+        "note": note(first),
+        "remarks": [
+            f"{of}: {line}" if len(found) > 1 else line for of, one in found.items() for line in remarks(one)
+        ]
+        + _elsewhere(reading, analysis),
+        "inputs": inputs_table(first, sources),
+        "tables": made,
+        "exact": schema.is_exact(first),
+        "integrated": bool(integrated(first)),
+        "bounded": any("probability" in one and bounded(one, "probability") for one in found.values()),
+        "comparison": comparison(analysis, reading.found),
+        "confidence": f"{first.attrs['confidence']:.0%}",
+        "indices": any(map(has_indices, found.values())),
+    }
+
+
+def _elsewhere(reading: Reading, analysis: str) -> list[str]:
+    """Return in sentences which figures at nominal values stand with an earlier analysis."""
+    called = {"friction_sweep": "The model over friction", "mode_shapes": "Mode shapes"}
+    return [
+        f"{text} at nominal values: the same as of {other!r}"
+        for key, text in called.items()
+        if key in reading.found[analysis] and (other := reading.alike(analysis, key)) is not None
+    ]

@@ -9,9 +9,13 @@ from typing import TypeGuard
 import numpy as np
 import xarray as xr
 
+from hipuq import schema
 from hipuq.friction import INTEGRATED_OUTCOME
 from hipuq.report.summary import analyses
 from hipuq.schema import is_exact
+
+INTEGRATED_OUTCOME_OF_ANY = ("any_unstable", INTEGRATED_OUTCOME["any_unstable"])
+"""Outcomes of any unstable mode: sampled, and with friction integrated."""
 
 Found = Mapping[str, Mapping[str, xr.Dataset]]
 """Analysis -> name of a group -> its Dataset."""
@@ -57,15 +61,26 @@ def exact_of(sampled: xr.Dataset, found: Found) -> str | None:
             summed_up(exact, dims)
             and is_exact(exact)
             and str(exact.attrs.get("model", "")).startswith(label)
-            and _case(exact) == _case(sampled)
+            and case_of(exact) == case_of(sampled)
             and all(set(exact[dim].values) == set(sampled[dim].values) for dim in dims)
         ):
             return analysis
     return None
 
 
-def _case(results: xr.Dataset) -> tuple[object, ...]:
-    """Return the options of the model and the inputs, alike whether friction is sampled or integrated."""
+def case_of(results: xr.Dataset) -> tuple[object, ...]:
+    """Return the options of the model and the inputs, alike whether friction is sampled or integrated.
+
+    Parameters
+    ----------
+    results : Dataset
+        Of any method; of a sweep at one of its values, which then counts as the nominal one.
+
+    Returns
+    -------
+    tuple
+        To compare with that of other results.
+    """
     inputs, options = (json.loads(results.attrs.get(key) or "{}") for key in ("inputs", "options"))
     model = options.get("model")
     if not isinstance(model, dict):
@@ -76,6 +91,13 @@ def _case(results: xr.Dataset) -> tuple[object, ...]:
     # Neither the nominal friction nor who decides an open verdict changes the probability.
     model.get("nominal", {}).pop("friction", None)
     model.pop("certify", None)
+    fixed = {
+        str(name): float(one)
+        for name, one in results.coords.items()
+        if name in schema.PARAMETERS and not one.ndim
+    }
+    if fixed:
+        model["nominal"] = model.get("nominal", {}) | fixed
     return inputs, model, friction
 
 
@@ -120,3 +142,36 @@ def _held(sampled: xr.Dataset, exact: xr.Dataset) -> tuple[int, int]:
     asked = ((value.values > 0) | (middle > 0)) & ~np.isnan(value.values) & ~np.isnan(middle)
     held = (low <= value.values) & (value.values <= high)
     return int((held & asked).sum()), int(asked.sum())
+
+
+def pairs_of(found: Found) -> list[tuple[str, str, xr.Dataset, xr.Dataset]]:
+    """Return the probabilities that are told twice, with friction sampled and integrated.
+
+    Parameters
+    ----------
+    found : mapping
+        All results; of sweeps at one of their values.
+
+    Returns
+    -------
+    list of tuple
+        Sampled analysis, integrated analysis, and the results of both: same model, inputs, friction and
+        damping, each with one probability of any unstable mode.
+    """
+    sampled, other = (
+        [(name, groups[of]) for name, groups in found.items() if of in groups and _one(groups[of])]
+        for of in INTEGRATED_OUTCOME_OF_ANY
+    )
+    return [
+        (name, partner, one, two)
+        for name, one in sampled
+        for partner, two in other
+        if case_of(one) == case_of(two)
+    ]
+
+
+def _one(results: xr.Dataset) -> bool:
+    """Say whether results have one probability over everything."""
+    return "of" in results.attrs and any(
+        name in results and not results[name].ndim for name in ("probability_overall", "probability")
+    )

@@ -9,7 +9,17 @@ import xarray as xr
 
 from hipuq.plots.captions import outcome_of, parameter_label
 from hipuq.report import surrogate
-from hipuq.report.table import MISSING, Table, mode_label, number, sentence, share, with_limits, with_unit
+from hipuq.report.table import (
+    MISSING,
+    Table,
+    listed,
+    mode_label,
+    number,
+    sentence,
+    share,
+    with_limits,
+    with_unit,
+)
 
 DECIMALS = 3
 """Decimals of an index."""
@@ -98,9 +108,8 @@ def _rivals(results: xr.Dataset, top: int) -> str:
     if not names:
         return ""
     told = names if len(names) <= RIVALS else [*names[: RIVALS - 1], f"{len(names) - RIVALS + 1} others"]
-    listed = " and ".join(filter(None, [", ".join(told[:-1]), told[-1]]))
     are = "that" if len(names) == 1 else "those"
-    return f", which is not certain to be the most: the interval overlaps {are} of {listed}"
+    return f", which is not certain to be the most: the interval overlaps {are} of {listed(told)}"
 
 
 def _subject(results: xr.Dataset) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from hipuq import schema
+from hipuq.distributions import described
 from hipuq.errors import SchemaError
 from hipuq.report import sensitivity
 from hipuq.report.table import Table, mode_label, number, sentence, share
@@ -24,6 +25,9 @@ STUDY_ATTRS = ("title", "description", "study", "seed", "report", "study_file", 
 COMPARE = "compare"
 """Group of a results tree that holds the comparisons of methods."""
 
+LITERATURE = "literature"
+"""Group of a results tree that holds what was reported and measured elsewhere."""
+
 
 def analyses(tree: xr.DataTree) -> list[str]:
     """Return the names of the analyses in a results tree, in its order.
@@ -36,7 +40,7 @@ def analyses(tree: xr.DataTree) -> list[str]:
     missing = [key for key in STUDY_ATTRS if key not in tree.attrs]
     if missing:
         raise SchemaError(f"these are not the results of a study: the attribute {missing[0]!r} is missing")
-    return [str(name) for name in tree.children if name != COMPARE]
+    return [str(name) for name in tree.children if name not in (COMPARE, LITERATURE)]
 
 
 def comparisons(tree: xr.DataTree) -> Iterator[tuple[str, xr.Dataset]]:
@@ -45,11 +49,11 @@ def comparisons(tree: xr.DataTree) -> Iterator[tuple[str, xr.Dataset]]:
         yield str(problem), node.to_dataset(inherit=False)
 
 
-def estimates(tree: xr.DataTree, analysis: str) -> Iterator[tuple[str, xr.Dataset]]:
-    """Give the results of an analysis: the outcome analysed and its Dataset."""
-    for of, node in tree[analysis].children.items():
-        if "of" in node.attrs and any(name in node for name in ("probability", "mean", "S1")):
-            yield str(of), schema.check_results(node.to_dataset(inherit=False))
+def estimates(groups: Mapping[str, xr.Dataset]) -> Iterator[tuple[str, xr.Dataset]]:
+    """Give the results of an analysis among its groups: the outcome analysed and its Dataset."""
+    for of, results in groups.items():
+        if "of" in results.attrs and any(name in results for name in ("probability", "mean", "S1")):
+            yield of, schema.check_results(results)
 
 
 def bounded(results: xr.Dataset, key: str) -> bool:
@@ -113,13 +117,13 @@ def tables(results: xr.Dataset, mode_names: dict[str, str] | None = None) -> lis
     if f"{quantity}_mean" in results:
         if "mode" in results.dims:
             return _by_mode_and_group(results, quantity, mode_names)
-        return [_by_group(results, quantity)]
+        return [group_table(results, quantity)]
     if "mode" in results.dims:
         return [_by_mode(results, quantity, mode_names)]
     return []
 
 
-def _by_group(results: xr.Dataset, quantity: str) -> Table:
+def group_table(results: xr.Dataset, quantity: str) -> Table:
     """Return a row for each group of levels."""
     text = _text(results, quantity, 8)
     group = str(results[f"{quantity}_mean"].dims[0])
@@ -132,7 +136,7 @@ def _by_group(results: xr.Dataset, quantity: str) -> Table:
         mean, low, high, least, most, by_weight = (text(float(part[f"{quantity}_{end}"])) for end in ends)
         between = [f"{low} to {high}"] if limits else []
         rows.append([str(value), str(size), mean, *between, least, most, *([by_weight] if weighted else [])])
-    columns = [_heading(results, group), "levels", "mean", *([_limits(results)] if limits else [])]
+    columns = [_heading(results, group), "levels", "mean", *([limits_word(results)] if limits else [])]
     columns += ["minimum", "maximum", *(["weighted mean"] if weighted else [])]
     return Table(f"{_title(results, quantity)}; over the levels of each group", columns, rows)
 
@@ -145,14 +149,14 @@ def _by_mode_and_group(results: xr.Dataset, quantity: str, names: dict[str, str]
     forms = {
         "mean": ("{0}", ("mean",)),
         "minimum to maximum": ("{0} to {1}", ("min", "max")),
-        f"{_limits(results)} of the mean": ("{0} to {1}", ("mean_low", "mean_high")),
+        f"{limits_word(results)} of the mean": ("{0} to {1}", ("mean_low", "mean_high")),
     }
     if not bounded(results, f"{quantity}_mean"):
         forms.popitem()
     made = []
     for title, (form, ends) in forms.items():
         rows = []
-        for mode in _modes_shown(results, quantity):
+        for mode in modes_shown(results, quantity):
             at = results.sel(mode=mode)
             cells = [
                 form.format(*(text(float(at[f"{quantity}_{end}"].sel({group: value}))) for end in ends))
@@ -176,12 +180,13 @@ def _by_mode(results: xr.Dataset, quantity: str, names: dict[str, str] | None) -
             mode_label(results, mode, names),
             *(text(float(results[quantity + end].sel(mode=mode))) for end in ends),
         ]
-        for mode in _modes_shown(results, quantity)
+        for mode in modes_shown(results, quantity)
     ]
     return Table(f"{_title(results, quantity)} by mode", ["mode", *ends.values()], rows)
 
 
-def _limits(results: xr.Dataset) -> str:
+def limits_word(results: xr.Dataset) -> str:
+    """Return what the limits of results are called in a heading."""
     return "bounds" if schema.is_exact(results) else "interval"
 
 
@@ -206,8 +211,16 @@ def _text(results: xr.Dataset, quantity: str, digits: int) -> Callable[[float], 
     return partial(share, digits=digits if schema.is_exact(results) else 4)
 
 
-def inputs_table(results: xr.Dataset) -> Table:
-    """Return the uncertain inputs of a result as a table, with those integrated out of the model."""
+def inputs_table(results: xr.Dataset, sources: Mapping[str, str] | None = None) -> Table:
+    """Return the uncertain inputs of a result as a table, with those integrated out of the model.
+
+    Parameters
+    ----------
+    results : Dataset
+    sources : mapping, optional
+        Parameter -> where its distribution is from; a column where any is told.
+    """
+    told = dict(sources or {})
     rows = []
     for name, entry in json.loads(results.attrs["inputs"]).items():
         if entry["how"] == "contact_patterns":
@@ -216,15 +229,19 @@ def inputs_table(results: xr.Dataset) -> Table:
             drawn = f"all choices of {counts} of {entry['oscillators']}, {weights}"
             how = "every pattern once" if schema.is_exact(results) else "pattern"
         else:
-            drawn = _distribution(entry["distribution"])
+            drawn = distribution_text(entry["distribution"])
             how = {"absolute": "value", "relative": "nominal * (1 + draw)", "shift": "nominal + draw"}[
                 entry["how"]
             ]
             how += f", one draw for each {entry['dims'][0]}" if entry["each"] else ""
-        rows.append([name, *_meaning(name), how, drawn])
+        rows.append([name, *_meaning(name), how, drawn, told.get(name, "")])
     for name, source in integrated(results).items():
-        rows.insert(0, [name, *_meaning(name), "integrated, not sampled", _distribution(source)])
-    return Table("Uncertain inputs", ["parameter", "meaning", "unit", "applied as", "distribution"], rows)
+        row = [name, *_meaning(name), "integrated, not sampled", distribution_text(source)]
+        rows.insert(0, [*row, told.get(name, "")])
+    columns = ["parameter", "meaning", "unit", "applied as", "distribution", "source"]
+    if not any(row[-1] for row in rows):
+        columns, rows = columns[:-1], [row[:-1] for row in rows]
+    return Table("Uncertain inputs", columns, rows)
 
 
 def integrated(results: xr.Dataset) -> Mapping[str, Mapping[str, Any]]:
@@ -233,24 +250,31 @@ def integrated(results: xr.Dataset) -> Mapping[str, Mapping[str, Any]]:
     return model.get("integrated", {}) if isinstance(model, dict) else {}
 
 
+def friction_words(results: xr.Dataset) -> str:
+    """Return the distribution of friction, sampled or integrated, in a few words; may be empty."""
+    source = integrated(results).get("friction")
+    if source is None:
+        entry = json.loads(results.attrs.get("inputs") or "{}").get("friction", {})
+        source = entry.get("distribution")
+    return f"friction {distribution_text(source)}" if source else ""
+
+
 def _meaning(name: str) -> tuple[str, str]:
     """Return what a parameter means, and its unit."""
     known = schema.PARAMETERS.get(name)
     return (known.long_name, known.units) if known else (name, "")
 
 
-def _distribution(source: Mapping[str, Any]) -> str:
+def distribution_text(source: Mapping[str, Any]) -> str:
     """Return a distribution as text, such as ``Uniform(lower=0.0, upper=0.1)``."""
-    arguments = [*map(str, source.get("args", ()))]
-    arguments += [f"{key}={value}" for key, value in source.get("kwargs", {}).items()]
-    return source.get("text") or f"{source['name']}({', '.join(arguments)})"
+    return described(source)
 
 
 def _title(results: xr.Dataset, quantity: str) -> str:
     return str(results[quantity].attrs["long_name"]).capitalize()
 
 
-def _modes_shown(results: xr.Dataset, quantity: str) -> list[int]:
+def modes_shown(results: xr.Dataset, quantity: str) -> list[int]:
     """Return the modes that are ever unstable or unknown; all of them for other quantities."""
     modes = [int(mode) for mode in results["mode"].values]
     if quantity != "probability":

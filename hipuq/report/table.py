@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,6 +95,27 @@ def duration(seconds: float) -> str:
     )
     value = seconds / size
     return f"{value:.3g} {unit}" if value < 999.5 else f"{value:,.0f} {unit}"
+
+
+def listed(parts: Iterable[str]) -> str:
+    """Return words as a list, such as ``a, b and c``; empty of none."""
+    *first, last = [*parts] or [""]
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def fitting(value: float, low: float, high: float) -> str:
+    """Return a probability with as many decimals as its limits leave, such as ``0.790 (0.781 to 0.799)``."""
+    if np.isnan([value, low, high]).any():
+        return with_ends([share(one) for one in (value, low, high)])
+    width = high - low
+    digits = int(np.clip(1 - np.floor(np.log10(width)), 2, 8)) if width > 0 else 8
+    return with_ends([share(one, digits) for one in (value, low, high)])
+
+
+def with_ends(texts: Sequence[str]) -> str:
+    """Return value, lower and upper limit as one text; limits that are unknown are left out."""
+    middle, *ends = texts
+    return middle if MISSING in ends else f"{middle} ({ends[0]} to {ends[1]})"
 
 
 def sentence(text: str) -> str:

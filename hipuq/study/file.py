@@ -23,6 +23,9 @@ MAXIMUM_BYTES = 1_000_000
 COMPARE = "compare"
 """Group of the comparisons in the results; no analysis may have its name."""
 
+LITERATURE = "literature"
+"""Group of what is published, in the results; no analysis may have its name."""
+
 
 class StudyFile(Table):
     """A whole study file.
@@ -62,6 +65,8 @@ class StudyFile(Table):
             raise ValueError(f"the name {min(twice)!r} is given to two analyses")
         if COMPARE in names:
             raise ValueError(f"no analysis can be called {COMPARE!r}: comparisons are kept under that name")
+        if LITERATURE in names:
+            raise ValueError(f"no analysis can be called {LITERATURE!r}: what is published is kept there")
         return self
 
 

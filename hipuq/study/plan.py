@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,10 @@ from hipuq.models.oscillator_ring import OscillatorRing
 from hipuq.sampling import seed_of
 from hipuq.study.building import distributions_of, model_of, without_friction
 from hipuq.study.file import StudyFile, read_study_file
+from hipuq.study.headline import check_headline, damping_sweep
 from hipuq.study.problems import Problem, problems_of
 from hipuq.study.tables import AnalysisTable, ReportTable
+from hipuq.sweeping import Values, check_over, points
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,12 @@ class Analysis:
         Options of the method by stage.
     evaluations : int
         Model runs that it takes.
+    over : dict
+        Parameter -> values at which it is made; empty for an ordinary analysis.
+    sources : mapping
+        Input -> where its distribution is from, as far as the study says it.
+    implied : bool
+        Whether the study adds it by itself.
     """
 
     name: str
@@ -54,6 +62,9 @@ class Analysis:
     of: tuple[str, ...]
     options: Mapping[str, Mapping[str, Any]]
     evaluations: int
+    over: Values = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
+    implied: bool = False
 
 
 @dataclass(frozen=True)
@@ -123,6 +134,12 @@ def load_study(path: str | os.PathLike[str], *, seed: int | None = None) -> Stud
         except HipuqError as error:
             raise StudyError(f"{file}, analysis {entry.name!r}: {error}") from error
     try:
+        check_headline(table, analyses)
+        if (swept := damping_sweep(table, analyses)) is not None:
+            analyses.append(replace(_analysis(table, swept), implied=True))
+    except HipuqError as error:
+        raise StudyError(f"{file}, report: {error}") from error
+    try:
         problems = problems_of(table, file.parent)
     except HipuqError as error:
         raise StudyError(f"{file}, {error}") from error
@@ -137,7 +154,8 @@ def load_study(path: str | os.PathLike[str], *, seed: int | None = None) -> Stud
 def _analysis(table: StudyFile, entry: AnalysisTable) -> Analysis:
     """Return one analysis with what it overrides."""
     base = model_of({**table.model, **({"preset": entry.preset} if entry.preset else {}), **entry.model})
-    given = distributions_of({**table.inputs, **entry.inputs})
+    tables = {name: own for name, own in table.inputs.items() if name not in entry.over} | entry.inputs
+    given = distributions_of(tables)
     model: CEAModel | FrictionIntegrated = base
     if entry.integrate_friction:
         model, given = without_friction(base, given)
@@ -147,8 +165,20 @@ def _analysis(table: StudyFile, entry: AnalysisTable) -> Analysis:
     for of in entry.of:
         check_name("outcome in of", of, model.outcomes)
     evaluations = method.plan(inputs, entry.n, entry.of, options)
+    over = check_over(entry.over, model, inputs) if entry.over else {}
     _check_report(table.report, base)
-    return Analysis(entry.name, model, inputs, entry.method, entry.n, tuple(entry.of), options, evaluations)
+    return Analysis(
+        entry.name,
+        model,
+        inputs,
+        entry.method,
+        entry.n,
+        tuple(entry.of),
+        options,
+        evaluations * len(points(over)),
+        over,
+        {name: one.source for name, one in tables.items() if one.source},
+    )
 
 
 def _check_report(report: ReportTable, model: CEAModel) -> None:

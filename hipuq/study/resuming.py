@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,9 @@ from hipuq.comparison.record import Record
 from hipuq.errors import StoreError
 from hipuq.sampling import seed_of
 from hipuq.store import RESULTS_NAME, load_results
+from hipuq.study.analysing import BESIDE, Groups
 from hipuq.study.differences import difference
-from hipuq.study.file import COMPARE
+from hipuq.study.file import COMPARE, LITERATURE
 from hipuq.study.plan import Analysis, Study
 from hipuq.study.problems import Problem
 
@@ -26,12 +28,15 @@ DEFINITIONS = "analyses"
 AT_NOMINAL = ("friction_sweep", "mode_shapes")
 """Groups of an analysis that hold what the report shows at nominal values."""
 
-Groups = dict[str, xr.Dataset]
-
 
 def analysis_seed(study: Study, place: int) -> int:
-    """Return the seed of the analysis at a place: one more at the end changes no other."""
-    return seed_of(np.random.SeedSequence(study.seed, spawn_key=(place,)))
+    """Return the seed of the analysis at a place: one more at the end changes no other.
+
+    That of an analysis which the study adds by itself depends on its name, not on its place.
+    """
+    analysis = study.analyses[place]
+    key = zlib.crc32(analysis.name.encode()) if analysis.implied else place
+    return seed_of(np.random.SeedSequence(study.seed, spawn_key=(key,)))
 
 
 def definitions(study: Study) -> dict[str, dict[str, Any]]:
@@ -43,6 +48,7 @@ def definitions(study: Study) -> dict[str, dict[str, Any]]:
 
 
 def _definition(analysis: Analysis, seed: int) -> dict[str, Any]:
+    over = {"over": {name: list(own) for name, own in analysis.over.items()}} if analysis.over else {}
     return {
         "hipuq_version": __version__,
         "seed": seed,
@@ -53,6 +59,7 @@ def _definition(analysis: Analysis, seed: int) -> dict[str, Any]:
         "model_options": analysis.model.options,
         "inputs": json.loads(analysis.inputs.to_json()),
         "options": {stage: dict(own) for stage, own in analysis.options.items()},
+        **over,
     }
 
 
@@ -103,7 +110,11 @@ def earlier(study: Study, folder: Path) -> Earlier:
     tree = load_results(folder)
     analyses = _analyses(study, folder, tree)
     report = dict(zip(AT_NOMINAL, (study.report.friction_sweep, study.report.mode_shapes), strict=True))
-    gone = [name for name in tree.children if name not in {COMPARE, *(one.name for one in study.analyses)}]
+    gone = [
+        name
+        for name in tree.children
+        if name not in {COMPARE, LITERATURE, *(one.name for one in study.analyses)}
+    ]
     for one in analyses:
         gone += [f"{one}/{name}" for name, own in report.items() if not own and name in tree.children[one]]
     dropped = {str(name): "the study no longer has it" for name in gone}
@@ -173,7 +184,7 @@ def _analyses(study: Study, folder: Path, tree: xr.DataTree) -> dict[str, Groups
         }
         _check_same(one.name, before, asked[one.name], folder)
         if set(one.of) <= set(groups):
-            wanted = {*one.of, *(AT_NOMINAL if same_report else ())}
+            wanted = {*one.of, *((*AT_NOMINAL, *BESIDE) if same_report else ())}
             found[one.name] = {f"{one.name}/{key}": own for key, own in groups.items() if key in wanted}
     return found
 

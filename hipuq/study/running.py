@@ -8,18 +8,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import xarray as xr
 
-from hipuq import __version__, schema
-from hipuq.driver import completed, estimated, method_named
+from hipuq import __version__
 from hipuq.errors import StoreError
-from hipuq.evaluation import evaluate
-from hipuq.models import CEAModel
-from hipuq.store import RESULTS_NAME, add_results, load_results, save_outcomes, save_results
-from hipuq.study.plan import Analysis, Study
-from hipuq.study.resuming import DEFINITIONS, Earlier, Groups, analysis_seed, definitions, earlier
-from hipuq.study.tables import ReportTable
+from hipuq.evidence import FIGURES, literature
+from hipuq.models.oscillator_ring import OscillatorRing
+from hipuq.store import RESULTS_NAME, add_results, load_results, save_results, versions
+from hipuq.study.analysing import Groups, analysed, at_nominal, beside_again
+from hipuq.study.file import LITERATURE
+from hipuq.study.plan import Study
+from hipuq.study.resuming import DEFINITIONS, Earlier, analysis_seed, definitions, earlier
 
 
 def run_study(
@@ -71,19 +70,24 @@ def run_study(
     for name, why in before.dropped.items():
         say(f"{name}: dropped from {folder / RESULTS_NAME}, {why}")
     old = [] if resume else [one.store(folder) for one in problems]
-    names = ["/", *(one.name for one in study.analyses), *(one.group for one in problems)]
-    results = _Results(folder, names, _root(study) | before.comparisons, old)
+    names = ["/", LITERATURE, *(one.name for one in study.analyses), *(one.group for one in problems)]
+    groups = _root(study) | before.comparisons | _literature(study)
+    results = _Results(folder, names, groups, old)
     if before.analyses:
         results.add({key: own for groups in before.analyses.values() for key, own in groups.items()})
     for i, analysis in enumerate(study.analyses):
         if analysis.name in before.analyses:
-            results.add(_at_nominal(analysis, study.report, n_jobs, before.analyses[analysis.name]))
+            there = before.analyses[analysis.name]
+            results.add(beside_again(analysis, study.report, folder, there))
+            results.add(at_nominal(analysis, study.report, n_jobs, there))
             say(f"{analysis.name}: kept, complete in {folder}")
             continue
-        results.add(_analysed(analysis, study, i, folder, n_jobs, progress, say))
+        seed = analysis_seed(study, i)
+        found = analysed(analysis, study.report, seed, folder, n_jobs=n_jobs, progress=progress, say=say)
+        results.add(found | at_nominal(analysis, study.report, n_jobs, {}))
     results.give_way()
     for problem in problems:
-        found = problem.run(
+        compared = problem.run(
             study.seed,
             folder,
             n_jobs=n_jobs,
@@ -91,10 +95,10 @@ def run_study(
             progress=progress,
             say=_about(problem.group, say),
         )
-        results.add({problem.group: found})
+        results.add({problem.group: compared})
         say(
             f"{problem.group}: complete, {problem.evaluations:,} evaluations, "
-            f"runs of {float(found['seconds'].sum()):.1f} s in all"
+            f"runs of {float(compared['seconds'].sum()):.1f} s in all"
         )
     return results.tree()
 
@@ -153,61 +157,20 @@ def _root(study: Study) -> Groups:
         "seed": study.seed,
         "report": study.report.model_dump_json(),
         "study_file": study.text,
+        "command": f"hipuq run {study.name} --seed {study.seed}",
+        "sources": json.dumps({one.name: dict(one.sources) for one in study.analyses}),
+        "versions": json.dumps(versions()),
         DEFINITIONS: json.dumps(definitions(study)),
     }
     return {"/": xr.Dataset(attrs=attrs)}
 
 
-def _analysed(
-    analysis: Analysis,
-    study: Study,
-    place: int,
-    folder: Path,
-    n_jobs: int | None,
-    progress: bool | None,
-    say: Callable[[str], None],
-) -> Groups:
-    """Return the results of an analysis; its outcomes are written."""
-    method = method_named(analysis.method)
-    outcomes = completed(
-        analysis.model,
-        analysis.inputs,
-        method,
-        analysis.n,
-        analysis_seed(study, place),
-        of=analysis.of,
-        stages=analysis.options,
-        n_jobs=n_jobs,
-        progress=progress,
-    )
-    save_outcomes(outcomes, folder / "outcomes" / f"{analysis.name}.zarr")
-    found = {
-        f"{analysis.name}/{of}": estimated(
-            method, outcomes, analysis.inputs, of=of, **analysis.options["estimate"]
-        )
-        for of in analysis.of
-    }
-    open_ = int((outcomes["status"] == schema.STATUS["undecided"]).sum())
-    say(
-        f"{analysis.name}: {outcomes.sizes['sample']:,} evaluations of {analysis.model.label} in "
-        f"{outcomes.attrs['seconds']:.1f} s, {open_:,} undecided"
-    )
-    return found | _at_nominal(analysis, study.report, n_jobs, {})
-
-
-def _at_nominal(analysis: Analysis, report: ReportTable, n_jobs: int | None, before: Groups) -> Groups:
-    """Return what the report shows at nominal values, but for what is there already."""
-    groups: Groups = {}
-    model = analysis.model
-    if not isinstance(model, CEAModel):
-        return groups
-    sweep, shapes = f"{analysis.name}/friction_sweep", f"{analysis.name}/mode_shapes"
-    if report.friction_sweep is not None and sweep not in before:
-        grid = np.linspace(*report.friction_sweep, report.friction_points)
-        groups[sweep] = evaluate(model, model.nominal(friction=grid), n_jobs=n_jobs, progress=False)
-    if report.mode_shapes and shapes not in before:
-        groups[shapes] = model.mode_shapes(model.nominal(friction=report.shape_friction))
-    return groups
+def _literature(study: Study) -> Groups:
+    """Return what is published of hips, for models of one."""
+    models = [getattr(one.model, "model", one.model) for one in study.analyses]
+    if not study.report.literature or not any(isinstance(model, OscillatorRing) for model in models):
+        return {}
+    return {f"{LITERATURE}/{quantity}": literature(quantity) for quantity in FIGURES}
 
 
 def _about(group: str, say: Callable[[str], None]) -> Callable[[str], None]:

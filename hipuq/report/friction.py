@@ -1,0 +1,176 @@
+"""What friction does: the fragility curve, the onsets, and the friction that keeps squeak rare enough."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from hipuq import schema
+from hipuq.report.block import Block
+from hipuq.report.parts import origin
+from hipuq.report.reading import FRICTION, Reading
+from hipuq.report.table import Table, number, sentence, share
+
+FRAGILITY_TITLE = "Fragility: P(squeak) at each friction, and the onsets"
+
+LIMIT_TITLE = "Friction limit that keeps P(squeak) below a target"
+
+NONE, WHOLE = "none", "the whole range"
+"""What stands for a target that is exceeded from the start of the range, and for one that never is."""
+
+WAY_OUT = "an analysis with integrate_friction = true, or one swept over friction,"
+
+
+def curve(reading: Reading) -> tuple[str, xr.Dataset] | None:
+    """Return the analysis with a fragility curve, and the curve: its own group, or a sweep over friction."""
+    for name in reading.ranked:
+        if "fragility" in reading.found[name]:
+            return name, reading.found[name]["fragility"]
+        if FRICTION in reading.assumed[name]:
+            over = reading.swept_over(FRICTION)
+            if name in over:
+                one = over[name]
+                if "probability_overall" in one:
+                    ends = ("", "_low", "_high")
+                    kept = {f"probability{end}": one[f"probability_overall{end}"] for end in ends}
+                    one = xr.Dataset(kept, attrs=one.attrs)
+                return name, one
+    return None
+
+
+def group(reading: Reading, key: str) -> tuple[str, xr.Dataset] | None:
+    """Return the first analysis, that of the headline before all, with a group, and the group."""
+    name = next((name for name in reading.ranked if key in reading.found[name]), None)
+    return None if name is None else (name, reading.found[name][key])
+
+
+def fragility_block(reading: Reading) -> Block:
+    """Return what is said beside the fragility curve and the distribution of onsets.
+
+    Parameters
+    ----------
+    reading : Reading
+
+    Returns
+    -------
+    Block
+        Its figures are elsewhere; without a curve a sentence says what would give it.
+    """
+    found, onsets = curve(reading), group(reading, "onsets")
+    if found is None and onsets is None:
+        line = f"The fragility curve and the onsets need {WAY_OUT} which this study has not"
+        return Block("fragility", FRAGILITY_TITLE, [line] if reading.results is not None else [])
+    analysis = found[0] if found is not None else onsets[0] if onsets is not None else ""
+    lines = []
+    if found is not None:
+        lines += origin(reading, *found)
+        lines += _at_ends(found[1])
+    if onsets is not None:
+        lines += [] if onsets[0] == analysis else origin(reading, *onsets)
+        lines += onset_words(onsets[1])
+    return Block("fragility", FRAGILITY_TITLE, lines)
+
+
+def _at_ends(fragility: xr.Dataset) -> list[str]:
+    """Return the probability at the ends of the curve, in a sentence."""
+    values, friction = fragility["probability"].values, fragility["friction"].values
+    if not np.isfinite(values).any() or len(values) < 2:
+        return ["The probability is not known at any friction"] if not np.isfinite(values).any() else []
+    told = [f"{share(float(values[i]))} at a friction of {friction[i]:.4g}" for i in (0, -1)]
+    half = np.flatnonzero(values >= 0.5)
+    text = f"P(squeak) is {told[0]} and {told[1]}"
+    if half.size and half[0] > 0:
+        text += f"; it reaches one half between {friction[half[0] - 1]:.4g} and {friction[half[0]]:.4g}"
+    return [text]
+
+
+def onset_words(onsets: xr.Dataset) -> list[str]:
+    """Return the quantiles of the onset and how many have none, in sentences."""
+    found = onset_quantiles(onsets)
+    if found is None:
+        return ["No configuration has a known onset"]
+    quantiles, never, unknown = found
+    lines = []
+    if np.isfinite(quantiles).any():
+        low, median, high = (number(one) if np.isfinite(one) else "beyond the range" for one in quantiles)
+        lines.append(
+            f"The onset, the friction from which on a configuration is unstable, has the median {median}, "
+            "with "
+            f"5 % below {low} and 95 % below {high}"
+        )
+    if never:
+        lines.append(f"{100 * never:.3g} % of the configurations are stable over the whole range of friction")
+    if unknown:
+        lines.append(f"The onset of {100 * unknown:.3g} % of the configurations is not known")
+    return lines
+
+
+def onset_quantiles(onsets: xr.Dataset) -> tuple[np.ndarray, float, float] | None:
+    """Return the 5, 50 and 95 % quantiles of the known onsets, what has none, what is unknown.
+
+    Returns
+    -------
+    quantiles : (3,) array
+        Infinite where the range of friction ends before.
+    never, unknown : float
+        Shares of the weight.
+    """
+    onset = onsets["onset"].values.astype(np.float64)
+    weight = onsets["weight"].values if "weight" in onsets.coords else np.ones(onset.shape)
+    weight = weight / weight.sum()
+    known = ~np.isnan(onset)
+    if not known.any():
+        return None
+    order = np.argsort(onset[known], kind="stable")
+    reached = np.cumsum(weight[known][order]) / weight[known].sum()
+    place = np.minimum(np.searchsorted(reached, np.array([0.05, 0.5, 0.95]) - 1e-12), len(order) - 1)
+    return onset[known][order][place], float(weight[onset == np.inf].sum()), float(weight[~known].sum())
+
+
+def limit_block(reading: Reading) -> Block:
+    """Return the friction limits for each target.
+
+    Parameters
+    ----------
+    reading : Reading
+
+    Returns
+    -------
+    Block
+        Without them a sentence that says what would give them.
+    """
+    found = group(reading, "friction_limit")
+    if found is None:
+        line = f"The friction limits need {WAY_OUT} which this study has not"
+        return Block("limit", LIMIT_TITLE, [line] if reading.results is not None else [])
+    analysis, limits = found
+    rows, said = [], []
+    for i, target in enumerate(limits["target"].values):
+        value, low, high = (float(limits[f"friction_limit{end}"][i]) for end in ("", "_low", "_high"))
+        row = [f"{100 * float(target):g} %", _limit(value)]
+        if not schema.is_exact(limits):
+            row.append(f"{_limit(low)} to {_limit(high)}" if _limit(low) != _limit(high) else _limit(low))
+        rows.append(row)
+        if np.isfinite(value):
+            said.append(f"up to a friction of {value:.4g} at most {100 * float(target):g} %")
+    level = f"{100 * float(limits.attrs.get('confidence', np.nan)):g} % interval"
+    columns = ["target for P(squeak)", "friction limit", *([level] if not schema.is_exact(limits) else [])]
+    ends = limits["friction_limit"].attrs.get("range")
+    note = "" if ends is None else f"Friction was looked at from {float(ends[0]):g} to {float(ends[1]):g}. "
+    note += f"{sentence(NONE)}: the target is exceeded from the start; {WHOLE}: it is kept to the end"
+    lines = first = origin(reading, analysis, limits)
+    if said:
+        lines = [*first, sentence(f"{'; '.join(said)} of the configurations are unstable")]
+    brief_columns = ["target", *(row[0] for row in rows)]
+    brief = Table(
+        "", brief_columns, [[columns[k], *(row[k] for row in rows)] for k in range(1, len(columns))]
+    )
+    table = Table("Friction up to which P(squeak) stays at or below a target", columns, rows, note)
+    return Block("limit", LIMIT_TITLE, lines, [table], brief=[brief, *first])
+
+
+def _limit(value: float) -> str:
+    """Return a friction limit as text: infinity and NaN in words."""
+    if np.isinf(value):
+        return WHOLE
+    return NONE if np.isnan(value) else number(value)

@@ -1,0 +1,163 @@
+"""The headline of a report: the probability of squeak, its interval, its method, what it assumes."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import xarray as xr
+
+from hipuq import schema
+from hipuq.methods import METHODS
+from hipuq.report.block import Block
+from hipuq.report.damping import NONE, at_damping, damping_words, label, percent_of
+from hipuq.report.reading import DAMPING, Reading, model_options, probability_name
+from hipuq.report.summary import integrated
+from hipuq.report.table import fitting, number, share
+
+SAMPLERS = {"latin_hypercube": "latin hypercube", "sobol": "Sobol points"}
+"""Samplers of Monte Carlo that are not plain random ones, in words."""
+
+SMALLEST = 1e-8
+"""Probabilities below it are told with an exponent."""
+
+
+def lead(results: xr.Dataset) -> str:
+    """Return the probability of squeak in one line.
+
+    Parameters
+    ----------
+    results : Dataset
+        With one probability of any unstable mode.
+
+    Returns
+    -------
+    str
+        Such as ``"P(squeak) = 0.790 (0.781 to 0.799, 95 % interval) at 1 % modal damping; Monte Carlo,
+        8,320 evaluations"``. Where nothing or everything is unstable it says of how many, and the limit.
+    """
+    where = f" {words}" if (words := at_damping(results)) else ""
+    return f"P(squeak) {chance(results)}{where}; {method_words(results)}"
+
+
+def chance(results: xr.Dataset) -> str:
+    """Return a probability with its limits after the sign of equality, such as ``"= 0.5 (0.4 to 0.6)"``."""
+    name = probability_name(results)
+    value, low, high = (float(results[name + end]) for end in ("", "_low", "_high"))
+    exact = schema.is_exact(results)
+    level = "" if exact else f", {100 * float(results.attrs['confidence']):g} % interval"
+    if np.isnan(value):
+        return f"is not known: no evaluation has a verdict (it lies between {low:g} and {high:g})"
+    known = _known(results)
+    if exact:
+        # Limits apart from the value by rounding alone say nothing.
+        bounds = f" (bounds {share(low, 8)} to {share(high, 8)})" if high - low > 1e-12 else ""
+        return f"= {share(value, 8)}{bounds}"
+    if value == 0:
+        return f"= 0: none of {known} is unstable; at most {_small(high)}{level}"
+    if value == 1:
+        return f"= 1: all of {known} are unstable; at least {fitting(low, low, high).split(' (')[0]}{level}"
+    text = fitting(value, low, high)
+    if value < SMALLEST:
+        text = f"{value:.2g} ({low:.2g} to {high:.2g})"
+    return f"= {text.removesuffix(')')}{level})" if text.endswith(")") else f"= {text}"
+
+
+def _small(value: float) -> str:
+    """Return a small probability with two digits."""
+    return number(value, 2) if value < 1e-4 else f"{float(f'{value:.2g}')}"
+
+
+def _known(results: xr.Dataset) -> str:
+    """Return how many evaluations have a verdict, in words."""
+    count = int(results["known"].sum()) if "known" in results else int(results["evaluations"])
+    return f"{count:,} configurations" if integrated(results) else f"{count:,} evaluations"
+
+
+def method_words(results: xr.Dataset) -> str:
+    """Return how results were made: method, what is integrated or stratified, evaluations."""
+    count = f"{int(results['evaluations']):,} evaluations"
+    if schema.is_exact(results):
+        how = "friction integrated, " if integrated(results) else ""
+        return f"exact: {how}every level of the inputs once, {count}"
+    method = str(results.attrs["method"])
+    design = json.loads(results.attrs.get("options") or "{}").get("design", {})
+    words = [METHODS[method].title if method in METHODS else method]
+    if method == "chaos":
+        words[0] += " corrected by true evaluations"
+    if design.get("sampler") in SAMPLERS:
+        words.append(SAMPLERS[design["sampler"]])
+    if design.get("stratify"):
+        words.append(f"stratified by {str(design['stratify']).replace('_', ' ')}")
+    if integrated(results):
+        words.append("friction integrated")
+    return ", ".join([*words, count])
+
+
+def meaning(results: xr.Dataset) -> str:
+    """Return in a sentence what the probability is of."""
+    threshold = float(model_options(results).get("growth_threshold") or 0.0)
+    what = f"a mode that grows faster than {threshold:g} 1/s" if threshold else "an unstable mode"
+    return (
+        f"This is the probability that the model {results.attrs['model']} has {what} under the inputs "
+        "below; it "
+        "is a property of the model, not the share of patients whose hip squeaks"
+    )
+
+
+def headline(reading: Reading) -> Block:
+    """Return the lead of the report: the probability, what it is of, what it assumes.
+
+    Parameters
+    ----------
+    reading : Reading
+
+    Returns
+    -------
+    Block
+        Its first line is the lead. Without a probability of any unstable mode it says what would give one.
+    """
+    results = reading.results
+    if results is None or reading.analysis is None:
+        line = (
+            "No analysis gives a probability of any unstable mode: one of any_unstable, or of probability "
+            "with friction integrated, by Monte Carlo or polynomial chaos would"
+        )
+        return Block("squeak", "Probability of squeak", [line], brief=[line])
+    lines = [meaning(results), *assumptions(reading)]
+    return Block("squeak", "Probability of squeak", [lead(results), *lines], brief=[lead(results), *lines])
+
+
+def assumptions(reading: Reading) -> list[str]:
+    """Return in sentences which analysis the headline is, at which values, and why."""
+    name, results = reading.analysis, reading.results
+    assert name is not None and results is not None
+    asked = reading.report.get("headline")
+    why = "as the study asks" if asked == name else "the first with such a probability"
+    if asked and asked != name:
+        why = f"since {asked!r}, which the study asks for, gives no such probability"
+    lines = [f"It is the analysis {name!r}, {why}: {label(results)}"]
+    for parameter, at in reading.assumed[name].items():
+        value = percent_of(at.value) if parameter == DAMPING else f"{at.value:g}"
+        called = parameter.replace("_", " ")
+        lines.append(
+            f"The {called} of {value} is an assumption, {at.why}; the analysis ranges over others too"
+        )
+    words = damping_words(results)
+    if words and DAMPING not in reading.assumed[name]:
+        given = "No damping is" if words == NONE else f"The damping ({words}) is"
+        more = (
+            "what damping does is told next"
+            if reading.swept_over(DAMPING)
+            else "an analysis over the damping ratio would tell what it does"
+        )
+        lines.append(f"{given} an assumption; {more}")
+    if "trusted" in results and not bool((results["trusted"] != 0).all()):
+        lines.append("The surrogate behind it is not to be trusted, so its interval is wide, or wrong")
+    if undecided := int(results["undecided"]) + int(results["failed"]):
+        lines.append(
+            f"{undecided:,} of {int(results['evaluations']):,} evaluations have no verdict: they count as "
+            "stable in "
+            "the lower limit and as unstable in the upper one"
+        )
+    return lines

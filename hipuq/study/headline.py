@@ -1,0 +1,118 @@
+"""Which probability a study tells first, and how it depends on damping, which decides it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from hipuq.errors import InputError, check_name
+from hipuq.study.file import StudyFile
+from hipuq.study.tables import AnalysisTable
+
+if TYPE_CHECKING:
+    from hipuq.study.plan import Analysis
+
+DAMPING = "damping_ratio"
+
+DAMPING_SWEEP = "damping_sweep"
+"""Name of the analysis over the damping ratio that a study adds by itself."""
+
+OF_ANY_MODE = ("any_unstable", "probability")
+"""Outcomes whose probability is that of instability as a whole."""
+
+
+WITH_PROBABILITY = ("monte_carlo", "chaos")
+"""Methods that estimate one."""
+
+
+def headline_of(table: StudyFile, analyses: Sequence[Analysis]) -> Analysis | None:
+    """Return the analysis whose probability is told first: the one named, else the first that has one.
+
+    Parameters
+    ----------
+    table : StudyFile
+    analyses : sequence of Analysis
+
+    Returns
+    -------
+    Analysis or None
+    """
+    named = table.report.headline
+    for one in analyses:
+        if one.name == named or (named is None and _tells(one)):
+            return one
+    return None
+
+
+def _tells(analysis: Analysis) -> bool:
+    """Say whether an analysis estimates a probability of instability."""
+    return analysis.method in WITH_PROBABILITY and any(of in OF_ANY_MODE for of in analysis.of)
+
+
+def check_headline(table: StudyFile, analyses: Sequence[Analysis]) -> None:
+    """Check what the report says of its headline.
+
+    Parameters
+    ----------
+    table : StudyFile
+    analyses : sequence of Analysis
+
+    Raises
+    ------
+    InputError
+        If there is no such analysis, it tells no probability, or is not over the damping ratio.
+    """
+    report = table.report
+    if report.headline is not None:
+        check_name("analysis in headline", report.headline, [one.name for one in analyses])
+    found = headline_of(table, analyses)
+    if report.headline is not None and found is not None and not _tells(found):
+        raise InputError(
+            f"headline {found.name!r} tells no probability of instability: it needs the method "
+            f"{' or '.join(WITH_PROBABILITY)} with {' or '.join(OF_ANY_MODE)} in of"
+        )
+    if report.damping_ratio is None:
+        return
+    values = () if found is None else found.over.get(DAMPING, ())
+    if report.damping_ratio not in values:
+        name = "" if found is None else f" {found.name!r}"
+        raise InputError(
+            f"{DAMPING} is {report.damping_ratio}, which the headline's analysis{name} is not over: it must "
+            f"be one of its over = {{ {DAMPING} = [...] }}, {list(values) or 'which it has not'}"
+        )
+
+
+def damping_sweep(table: StudyFile, analyses: Sequence[Analysis]) -> AnalysisTable | None:
+    """Return the analysis over the damping ratio that a study needs and does not have.
+
+    Parameters
+    ----------
+    table : StudyFile
+    analyses : sequence of Analysis
+
+    Returns
+    -------
+    AnalysisTable or None
+        Of the model and inputs of the headline, friction sampled. None where an analysis is over the
+        damping ratio or draws it, the model has none, or the report asks for none.
+    """
+    found = headline_of(table, analyses)
+    if found is None or not table.report.damping_samples or DAMPING not in found.model.parameters:
+        return None
+    if any(one.name == DAMPING_SWEEP or DAMPING in one.over or DAMPING in one.inputs for one in analyses):
+        return None
+    entry = next(one for one in table.analysis if one.name == found.name)
+    samples = table.report.damping_samples
+    if not entry.integrate_friction:
+        samples = min(samples, found.evaluations)
+    return entry.model_copy(
+        update={
+            "name": DAMPING_SWEEP,
+            "method": "monte_carlo",
+            "n": samples,
+            "integrate_friction": False,
+            "of": ["any_unstable"],
+            "options": {},
+            "over": {DAMPING: table.report.damping_ratios},
+        }
+    )
