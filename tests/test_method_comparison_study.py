@@ -19,14 +19,21 @@ STUDY = Path(__file__).parents[1] / "studies" / "method_comparison"
 PROBLEMS = ("hoffmann", "hulten", "hoffmann_ST", "oberst2016", "ring", "ring_S1", "ring_ST")
 
 
+DEAR = ("integrated", "chaos of 39 inputs")
+"""Contenders that take most of the time."""
+
+
 @pytest.fixture(scope="module")
 def whole() -> Study:
     return hipuq.load_study(STUDY)
 
 
 def small(race):
-    """Return a comparison of the two smallest budgets of each contender, two replicates each."""
-    sizes = [dict(list(one.sizes.items())[:2]) for one in race.contenders]
+    """Return a comparison of the two smallest budgets of each contender, two replicates each.
+
+    Of those that are dear, the smallest alone.
+    """
+    sizes = [dict(list(one.sizes.items())[: 1 if one.name in DEAR else 2]) for one in race.contenders]
     budgets = tuple(b for b in race.budgets if any(b in own for own in sizes))
     contenders = tuple(
         replace(one, sizes=own, replicates=2) for one, own in zip(race.contenders, sizes, strict=True)

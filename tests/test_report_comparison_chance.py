@@ -188,10 +188,10 @@ def test_good_intervals_are_hardly_ever_accused():
 
 
 def test_the_size_of_the_effect_counts_too():
-    assert interval_words(covered(0.93, 20000)) == FINE
-    assert "too narrow" in interval_words(covered(0.91, 20000))
-    assert interval_words(covered(0.97, 20000)) == FINE
-    assert "conservative" in interval_words(covered(0.99, 20000))
+    assert interval_words(covered(0.93, 4000)) == FINE
+    assert "too narrow" in interval_words(covered(0.91, 4000))
+    assert interval_words(covered(0.97, 4000)) == FINE
+    assert "conservative" in interval_words(covered(0.99, 4000))
 
 
 def test_runs_without_an_interval_are_told():
