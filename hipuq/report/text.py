@@ -81,8 +81,11 @@ def show_results(
 
 def _lines(reading: Reading, screen: Console) -> None:
     """Print a line for each analysis: what it is, what it assumes, what comes out."""
+    # The probability of instability where there is one, else the first outcome.
     shown = [
-        (name, found) for name, groups in reading.found.items() if (found := next(estimates(groups), None))
+        (name, found if (own := reading.squeak(name)) is None else (str(own.attrs["of"]), own))
+        for name, groups in reading.found.items()
+        if (found := next(estimates(groups), None))
     ]
     if shown:
         screen.print("[bold]Analyses[/bold] (in full with --analysis NAME, or --all)")
@@ -90,7 +93,8 @@ def _lines(reading: Reading, screen: Console) -> None:
     models = len({_bare(results) for _, (_, results) in shown}) > 1
     for name, (of, results) in shown:
         method = "exact" if schema.is_exact(results) else str(results.attrs["method"])
-        told = [f"{method}, friction integrated" if integrated(results) else method]
+        # The label of the model says it too.
+        told = [f"{method}, friction integrated" if integrated(results) and not models else method]
         over = [parameter.replace("_", " ") for parameter in reading.assumed[name]]
         if reading.at_one(name):
             told += [label(results) if models else "", of]
