@@ -58,6 +58,8 @@ def run(
         typer.echo(
             f"  {analysis.name}: {analysis.method} of {', '.join(analysis.of)} with "
             f"{analysis.model.label}, {analysis.evaluations:,} evaluations"
+            + (f", over {' and '.join(analysis.over)}" if analysis.over else "")
+            + (f" (added by itself, as {analysis.like})" if analysis.like else "")
         )
     for problem in plan.problems:
         race = problem.race

@@ -172,7 +172,8 @@ def _in_order(given: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
             if not np.array_equal(np.sort(here), np.sort(there)):
                 raise SchemaError("the model returned other labels of 'sample' than it was given")
             given = given.isel(sample=np.argsort(here)[np.argsort(np.argsort(there))])
-    inherited = [values.attrs for values in samples.variables.values() if values.attrs]
+    # Of several operands what they have in common is left.
+    inherited = [{"units": ""}, *(values.attrs for values in samples.variables.values() if values.attrs)]
     bare = {n: v.drop_attrs() for n, v in given.data_vars.items() if v.attrs and v.attrs in inherited}
     return given.assign(bare)
 

@@ -1,7 +1,7 @@
 """What was measured in patients and on the bench, to be set beside a prediction.
 
-Only figures that were read at the source. They are of other things than a probability of instability in a
-model: an incidence is the share of patients who hear their implant over years of use.
+Figures that were read at their source, but for those that say who cites them. They are of other things than
+a probability of instability in a model: an incidence is the share of patients who heard their implant.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from hipuq import schema
 from hipuq.errors import check_name
 
 NAN = float("nan")
@@ -29,7 +30,7 @@ class Published:
     value : float
         NaN where only a range is given.
     low, high : float
-        Range or standard deviation as published; NaN where there is none.
+        Range, or value plus and minus the error, as published; NaN where there is none.
     reference : str
         Where it is published.
     """
@@ -41,7 +42,7 @@ class Published:
     reference: str
 
 
-OBERST = "Oberst et al., INTER-NOISE 2016, p. 5539"
+OBERST = "as cited by Oberst et al., INTER-NOISE 2016, p. 5539"
 LEE = "Lee et al., Hip & Pelvis 26 (2014) 92"
 JOSR = "J. Orthop. Surg. Res. 2018, doi 10.1186/s13018-018-0841-y"
 PARVIZI = "Parvizi et al., Clin. Orthop. Relat. Res. 469 (2011) 1598"
@@ -63,7 +64,7 @@ FIGURES: Mapping[str, tuple[str, str, tuple[Published, ...]]] = {
         ),
     ),
     "critical_friction": (
-        "friction coefficient at which squeak set in on the bench (mean, standard deviation)",
+        "friction coefficient at which squeak set in on the bench (with the range published)",
         "1",
         (
             Published("long Ti stem", 0.29, 0.27, 0.31, FAN),
@@ -124,7 +125,10 @@ def literature(quantity: str) -> xr.Dataset:
         for name, text in (("value", ""), ("low", ", low"), ("high", ", high"))
     }
     coords: dict[str, Any] = {
-        name: ("source", np.array([getattr(one, name) for one in figures]), {"long_name": name})
-        for name in ("source", "reference")
+        name: ("source", np.array([getattr(one, name) for one in figures]), {"long_name": text, "units": ""})
+        for name, text in (("source", "what it is of"), ("reference", "where it is published"))
     }
-    return xr.Dataset(data, coords=coords, attrs={"quantity": quantity})
+    found = xr.Dataset(data, coords=coords, attrs={"quantity": quantity})
+    # They are what they are at any time.
+    history = f"published figures of {quantity}"
+    return schema.stamp(found, history).assign_attrs(history=history)

@@ -22,9 +22,9 @@ LIMITS = ("", "_low", "_high")
 
 
 def friction_limit(outcomes: xr.Dataset, target: ArrayLike, *, confidence: float = 0.95) -> xr.Dataset:
-    """Return the friction up to which at most a share of the configurations becomes unstable.
+    """Return the friction up to which instability is as rare as a target.
 
-    It is the quantile of the onset: as long as friction stays at or below it, the probability of
+    Of outcomes it is the quantile of the onset: as long as friction stays at or below it, the probability of
     instability is at most the target, however friction is distributed there. Instability that ends again
     at a higher friction counts, for friction passes through it.
 
@@ -43,9 +43,9 @@ def friction_limit(outcomes: xr.Dataset, target: ArrayLike, *, confidence: float
     -------
     Dataset
         ``friction_limit``, ``friction_limit_low``, ``friction_limit_high`` over ``target``. Infinity means
-        that the target is not exceeded up to the end of the range (attribute ``range``), NaN that it is
-        exceeded from the start on, or that this is not known. Undecided configurations count as unstable
-        throughout in the lower limit and as never unstable in the upper one.
+        that the target is not exceeded up to the end of the range (attribute ``range``), minus infinity that
+        it is from the start, so that there is no such friction, and NaN that nothing is known. Undecided
+        configurations count as unstable throughout in the lower limit and as never unstable in the upper one.
 
     Raises
     ------
@@ -54,7 +54,12 @@ def friction_limit(outcomes: xr.Dataset, target: ArrayLike, *, confidence: float
     InputError
         If a target or the confidence cannot be one.
     """
-    targets = np.atleast_1d(np.asarray(target, dtype=np.float64))
+    if not isinstance(outcomes, xr.Dataset):
+        raise SchemaError(f"outcomes must be an xarray Dataset, not {type(outcomes).__name__}")
+    try:
+        targets = np.atleast_1d(np.asarray(target, dtype=np.float64))
+    except (TypeError, ValueError):
+        targets = np.array([np.nan])
     if targets.ndim != 1 or not targets.size or not ((targets >= 0) & (targets < 1)).all():
         raise InputError(f"target is {target!r}: it must be a probability from 0 to below 1, such as 0.03")
     if "onset" in outcomes.variables:
@@ -80,6 +85,8 @@ def _of_onsets(
     values = outcomes["onset"]
     if values.dims != ("sample",):
         raise SchemaError(f"the friction limit needs 'onset' over sample alone, it has {values.dims}")
+    if not values.size:
+        raise SchemaError("the outcomes are empty: at least one sample is needed")
     if "range" not in values.attrs:
         raise SchemaError("the onset does not say over which range: evaluate a model of integrate_friction")
     lower, upper = map(float, values.attrs["range"])
@@ -107,8 +114,8 @@ def _crossing(at: Array, share: Array, before: float, targets: Array, lower: flo
     # Weights add up to a share within rounding.
     exceeded = np.append(share, np.inf) > targets[:, None] + ROUNDING
     crossed = np.append(at, np.inf)[exceeded.argmax(axis=1)]
-    crossed[before > targets + ROUNDING] = np.nan
-    return np.where(crossed <= lower, np.nan, crossed)
+    crossed[before > targets + ROUNDING] = -np.inf
+    return np.where(crossed <= lower, -np.inf, crossed)
 
 
 def _of_curve(curve: xr.Dataset, targets: Array) -> tuple[list[Array], tuple[float, float], float]:
@@ -120,6 +127,8 @@ def _of_curve(curve: xr.Dataset, targets: Array) -> tuple[list[Array], tuple[flo
                 "the friction limit needs 'onset' over sample, from a model of integrate_friction, or "
                 f"{name!r} over friction"
             )
+    if "friction" not in curve.coords:
+        raise SchemaError("the friction limit needs the coord 'friction' of the curve")
     curve = curve.sortby("friction")
     friction = curve["friction"].values.astype(np.float64)
     found = [_before(friction, curve[f"probability{end}"].values, targets) for end in ("", "_high", "_low")]
@@ -130,5 +139,5 @@ def _before(friction: Array, share: Array, targets: Array) -> Array:
     """Return the last friction before a share first exceeds each target; an unknown one may exceed it."""
     exceeded = ~(share <= targets[:, None])
     first = exceeded.argmax(axis=1)
-    last = np.concatenate([[np.nan], friction])[first]
+    last = np.concatenate([[-np.inf], friction])[first]
     return np.where(exceeded.any(axis=1), last, np.inf)

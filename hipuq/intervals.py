@@ -13,6 +13,9 @@ from hipuq.errors import InputError
 
 Array = NDArray[np.float64]
 
+CARRYING = 30
+"""Draws that carry a mean, (sum of y)^2 / (sum of y^2), from which on its t interval is good."""
+
 
 def check_confidence(confidence: float) -> float:
     """Return a confidence level.
@@ -110,6 +113,47 @@ def student(mean: Array, squares: Array, n: Array, confidence: float) -> tuple[A
     error = np.sqrt(squares / (freedom * np.maximum(n, 1)))
     half = np.where(enough, stdtrit(freedom, 0.5 + confidence / 2) * error, np.nan)
     return mean - half, mean + half
+
+
+def graded(mean: Array, squares: Array, n: Array, confidence: float) -> tuple[Array, Array]:
+    """Return the interval of a mean of values between 0 and 1, such as probabilities, over independent draws.
+
+    The t interval, where enough draws carry the mean. Where they are few it is far too narrow: of values
+    that are 0 in 91 % and uniform to 0.2 else its 95 % limits hold in 30 % (4 draws), 69 % (16), 83 % (32),
+    90 % (64). There it is widened to the score interval of as many draws of 0 and 1 as have the variance
+    of the mean, so that it holds in 99, 96, 94 and 96 %, and where all values are 0, or all 1, to Wilson's.
+
+    Parameters
+    ----------
+    mean, squares, n : array
+        Mean, sum of squared deviations and number of draws.
+    confidence : float
+
+    Returns
+    -------
+    low, high : array
+        NaN for fewer than two draws.
+    """
+    low, high = student(mean, squares, n, confidence)
+    enough, draws = n > 1, np.maximum(n, 1.0)
+    squares = np.maximum(squares, 0.0)
+    carrying = [
+        np.divide(draws * part**2, squares / draws + part**2, out=np.zeros_like(mean), where=part > 0)
+        for part in (mean, 1 - mean)
+    ]
+    few = enough & (np.minimum(*carrying) < CARRYING)
+    differ = few & (squares > 0)
+    freedom = np.maximum(draws - 1, 1.0)
+    like = np.where(differ, mean * (1 - mean) * freedom * draws, 1.0) / np.where(differ, squares, 1.0)
+    centre, half = _score(mean, like, stdtrit(freedom, 0.5 + confidence / 2))
+    low, high = (
+        np.where(differ, np.minimum(low, centre - half), low),
+        np.where(differ, np.maximum(high, centre + half), high),
+    )
+    # What never came, or always did, may be rare: that is all that so many draws tell.
+    single = wilson(mean * draws, draws, confidence)
+    certain = few & ((mean <= 0) | (mean >= 1))
+    return np.where(certain, single[0], low), np.where(certain, single[1], high)
 
 
 def combined(

@@ -34,7 +34,8 @@ def frequency_ranges(outcomes: xr.Dataset) -> xr.Dataset:
     Dataset
         ``frequency_low``, ``frequency_median``, ``frequency_high`` over ``mode`` [Hz]: the frequencies
         below which 5, 50 and 95 % of the samples in which the mode is unstable lie (attribute ``levels``);
-        NaN for a mode that never is. ``unstable_samples`` is the number of them.
+        NaN for a mode that never is known to be. ``unstable_samples`` is the number of them,
+        ``known_samples`` that of the samples with a verdict.
 
     Raises
     ------
@@ -42,7 +43,11 @@ def frequency_ranges(outcomes: xr.Dataset) -> xr.Dataset:
         If one of the two outcomes is missing.
     """
     for name in ("frequency", "unstable"):
-        if name not in outcomes or set(outcomes[name].dims) != {"sample", "mode"}:
+        if (
+            not isinstance(outcomes, xr.Dataset)
+            or name not in outcomes
+            or set(outcomes[name].dims) != {"sample", "mode"}
+        ):
             raise SchemaError(f"frequency ranges need {name!r} over sample and mode: keep it in evaluate")
     frequency, verdict = (outcomes[name].transpose("mode", "sample") for name in ("frequency", "unstable"))
     unstable = (verdict.values == 1) & np.isfinite(frequency.values)
@@ -57,8 +62,15 @@ def frequency_ranges(outcomes: xr.Dataset) -> xr.Dataset:
             "units": "Hz",
         }
         data[name] = ("mode", values, attrs)
-    count = {"long_name": "samples in which the mode is unstable", "units": "1"}
-    data["unstable_samples"] = ("mode", unstable.sum(axis=1), count)
+    counts = {
+        "unstable_samples": ("samples in which the mode is unstable", unstable),
+        "known_samples": (
+            "samples in which it is known whether the mode is unstable",
+            verdict.notnull().values,
+        ),
+    }
+    for name, (text, where) in counts.items():
+        data[name] = ("mode", where.sum(axis=1), {"long_name": text, "units": "1"})
     coords = {name: coord for name, coord in verdict.coords.items() if coord.dims == ("mode",)}
     ranges = schema.stamp(xr.Dataset(data, coords=coords), "frequency ranges", like=outcomes.attrs)
     return ranges.assign_attrs(levels=list(LEVELS))

@@ -30,8 +30,9 @@ def curve(probability, *, width=0.0, friction=FRICTION, **attrs):
     )
 
 
-def outcomes(onset, **coords):
+def outcomes(onset, swept=None, **coords):
     said = {"long_name": "friction at the onset of instability (inf: never)", "units": "1"}
+    said |= {} if swept is None else {"range": swept}
     return xr.Dataset(
         {"onset": ("sample", np.asarray(onset, dtype=float), said)},
         coords={name: ("sample", value) for name, value in coords.items()},
@@ -174,8 +175,8 @@ def test_onsets_step_at_their_values():
     shown = ax.lines[0]
     assert shown.get_drawstyle() == "steps-post"
     x, y = shown.get_data()
-    np.testing.assert_allclose(x[:-1], [0, 0.02, 0.05])
-    assert x[-1] > 0.05
+    # Nothing is known beyond the last onset.
+    np.testing.assert_allclose(x, [0, 0.02, 0.05, 0.05])
     np.testing.assert_allclose(y, [0, 25, 75, 75])
     assert labels(ax) == ["onset at or below", "never unstable: 25 % (1 of 4)"]
     assert ax.get_xlabel() == "friction coefficient at the onset [1]"
@@ -185,7 +186,8 @@ def test_onsets_step_at_their_values():
 
 
 def test_unknown_onsets_bound_the_share():
-    ax = drawn(plots.onset_distribution(outcomes([0.05, 0.02, np.inf, np.nan, np.nan])))
+    data = outcomes([0.05, 0.02, np.inf, np.nan, np.nan], swept=(0.0, 0.1))
+    ax = drawn(plots.onset_distribution(data))
     np.testing.assert_allclose(ax.lines[0].get_ydata(), [0, 100 / 3, 200 / 3, 200 / 3])
     limits = band(ax)
     # As if the two were never unstable, and as if they always were.
@@ -206,10 +208,27 @@ def test_levels_count_by_their_weight():
     assert even.get_ylabel() == "share of configurations [%]"
 
 
+@pytest.mark.parametrize("onset", [[0.1, 0.1], [0.12, np.inf], [0.4, 0.1], [np.inf] * 2, [np.nan] * 2])
+def test_the_range_that_was_swept_is_drawn(onset):
+    ends = np.array([0.1, 0.4])
+    ax = drawn(plots.onset_distribution(outcomes(onset, swept=ends)))
+    for shown in ax.lines:
+        np.testing.assert_array_equal(shown.get_xdata()[[0, -1]], ends)
+    for shown in ax.collections:
+        assert all(path.vertices[:, 0].min() >= 0.1 for path in shown.get_paths())
+    np.testing.assert_allclose(ax.get_xlim(), [0.094, 0.406])
+    said = plots.onset_distribution(outcomes(onset), limits=limits([np.inf] * 2, [np.inf] * 2, [np.inf] * 2))
+    if np.isfinite(onset).all():
+        np.testing.assert_array_equal(said.lines[0].get_xdata()[[0, -1]], [0, max(onset)])
+
+
 def test_all_never_unstable():
     ax = drawn(plots.onset_distribution(outcomes([np.inf] * 9)))
     np.testing.assert_array_equal(ax.lines[0].get_ydata(), [0, 0])
     assert labels(ax)[1] == "never unstable: 100 % (9 of 9)"
+    # Nobody knows how far was looked.
+    assert not ax.get_xticks().size
+    assert ax.get_xlabel().endswith(": none, and the range is not known")
 
 
 def test_all_unstable_from_the_start_and_a_single_one():
@@ -293,7 +312,7 @@ def limits(values, low, high, targets=(0.05, 0.5), **attrs):
 
 
 def test_friction_limits_stand_at_their_targets():
-    given = limits([0.02, 0.05], [0.01, np.nan], [0.03, np.inf])
+    given = limits([0.02, 0.05], [0.01, -np.inf], [0.03, np.inf])
     ax = drawn(plots.onset_distribution(outcomes([0.02, 0.05, 0.08, np.inf]), limits=given))
     marks = [shown for shown in ax.collections if "not exceeded" in str(shown.get_label())]
     np.testing.assert_allclose([shown.get_offsets()[0] for shown in marks], [(0.02, 5), (0.05, 50)])
@@ -306,11 +325,14 @@ def test_friction_limits_stand_at_their_targets():
 
 
 def test_friction_limits_that_are_none_are_told():
-    given = limits([np.inf, np.nan], [np.inf, np.nan], [np.inf, np.nan])
+    given = limits([np.inf, -np.inf], [np.inf, -np.inf], [np.inf, -np.inf])
     ax = drawn(plots.onset_distribution(outcomes([0.02, np.inf]), limits=given))
     assert labels(ax)[2:] == [
         "5 %: not exceeded up to friction 0.1",
-        "50 %: exceeded from the start of the range, or unknown",
+        "50 %: exceeded from the start of the range",
     ]
+    unknown = limits([np.nan, 0.05], [-np.inf, 0.05], [np.inf, 0.05])
+    shown = labels(drawn(plots.onset_distribution(outcomes([0.02, np.inf]), limits=unknown)))
+    assert shown[2] == "5 %: not known"
     with pytest.raises(SchemaError, match="limits need 'friction_limit_low'"):
         plots.onset_distribution(outcomes([0.02]), limits=given.drop_vars("friction_limit_low"))

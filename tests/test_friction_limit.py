@@ -45,7 +45,7 @@ def test_the_interval_is_where_wilson_limits_cross():
 def test_too_few_samples_promise_no_friction():
     # With no event in 10 draws the share may still be 28 %: no lower limit for a target of 3 %.
     limits = hipuq.friction_limit(outcomes_of(np.full(10, 0.5)), 0.03)
-    assert np.isnan(values(limits, "_low")[0])
+    assert values(limits, "_low") == [-np.inf]
     assert values(limits) == [0.5]
 
 
@@ -62,7 +62,7 @@ def test_the_interval_holds_the_quantile():
 def test_never_and_from_the_start():
     assert values(hipuq.friction_limit(outcomes_of(np.full(50, np.inf)), 0.1)) == [np.inf]
     from_start = hipuq.friction_limit(outcomes_of(np.zeros(50)), 0.1)
-    assert all(np.isnan(values(from_start, end)[0]) for end in ("", "_low", "_high"))
+    assert [values(from_start, end) for end in ("", "_low", "_high")] == [[-np.inf]] * 3
 
 
 def test_unknown_onsets_widen_the_interval():
@@ -70,10 +70,12 @@ def test_unknown_onsets_widen_the_interval():
     some = onset.copy()
     some[:40] = np.nan
     known, open_ = (hipuq.friction_limit(outcomes_of(one), 0.45) for one in (onset, some))
-    assert np.isnan(values(open_, "_low")[0])
+    assert values(open_, "_low") == [-np.inf]
     assert values(open_, "_high")[0] > values(known, "_high")[0]
     nothing = hipuq.friction_limit(outcomes_of(np.full(3, np.nan)), 0.5)
-    assert np.isnan(values(nothing) + values(nothing, "_low")).all()
+    # Nothing is known, which is not the same as exceeded from the start.
+    assert np.isnan(values(nothing)).all()
+    assert values(nothing, "_low") == [-np.inf]
     assert values(nothing, "_high") == [np.inf]
 
 
@@ -119,7 +121,7 @@ def test_an_unknown_probability_of_a_curve_is_not_below():
     assert values(limits, "_high") == [0.2, np.inf]
 
 
-@pytest.mark.parametrize("target", [1.0, -0.1, np.nan, [], [[0.1]]])
+@pytest.mark.parametrize("target", [1.0, -0.1, np.nan, [], [[0.1]], "abc", ["a"], 0.5j, {0.1}])
 def test_a_target_is_a_probability_below_one(target):
     with pytest.raises(InputError, match="from 0 to below 1"):
         hipuq.friction_limit(outcomes_of([0.1]), target)
@@ -128,5 +130,12 @@ def test_a_target_is_a_probability_below_one(target):
 def test_what_has_no_onset_is_told():
     with pytest.raises(SchemaError, match="needs 'onset' over sample"):
         hipuq.friction_limit(xr.Dataset({"margin": ("sample", [1.0])}), 0.1)
+    with pytest.raises(SchemaError, match="not NoneType"):
+        hipuq.friction_limit(None, 0.1)
+    with pytest.raises(SchemaError, match="the outcomes are empty"):
+        hipuq.friction_limit(outcomes_of([]), 0.1)
+    bare = xr.Dataset({f"probability{end}": ("friction", [0.0, 1.0]) for end in ("", "_low", "_high")})
+    with pytest.raises(SchemaError, match="needs the coord 'friction'"):
+        hipuq.friction_limit(bare, 0.1)
     with pytest.raises(SchemaError, match="over which range"):
         hipuq.friction_limit(xr.Dataset({"onset": ("sample", [1.0])}), 0.1)

@@ -39,6 +39,7 @@ ORDER = [
     ["friction_limits"],
     ["occurring"],
     ["evidence"],
+    ["combinations"],
     ["estimation"],
     ["saltelli"],
     ["surrogates"],

@@ -213,7 +213,12 @@ def test_each_pair_is_shown_once():
     assert columns == [parameter_label(name) for name in NAMES[:-1]]
     at = {text.get_position(): text.get_text() for text in ax.texts}
     value = float(results["S2"].sel(parameter="contact_stiffness", parameter_2="contact"))
-    assert ax.get_title().endswith("beneath: 95 % interval")
+    assert ax.get_title().endswith("beneath: 95 % interval; hatched: 95 % interval holds 0")
+    low, high = (results[f"S2_{end}"].values[1:, :-1] for end in ("low", "high"))
+    hatched = {(mark.get_x() + 0.5, mark.get_y() + 0.5) for mark in ax.patches if mark.get_hatch()}
+    expected = {(j, i) for i, j in np.argwhere(np.tril((low <= 0) & (high >= 0)))}
+    assert 0 < len(expected) < 15
+    assert hatched == expected
     assert at[1, 2].split("\n") == [f"{value:.2f}", f"{value - 0.03:.2f} to", f"{value + 0.03:.2f}"]
 
 

@@ -278,3 +278,17 @@ def test_the_page_is_right_as_written():
     assert from_table(table) == hipuq.lubrication(
         cp.LogNormal(1.0, 0.5), boundary=cp.Uniform(0.3, 0.7), sources=own
     )
+
+
+def test_probabilities_and_values_of_a_study_have_sources():
+    shares = {"film": 0.5, "mixed": 0.3, "boundary": 0.2, "source": "own survey"}
+    found = from_table({"distribution": "lubrication", "lambda_ratio": shares})
+    assert sources(found.description)["lambda ratio"] == "probabilities of the regimes: own survey"
+    found = from_table({"distribution": "lubrication", "lambda_ratio": {"value": 5.0, "source": "own bench"}})
+    assert sources(found.description)["lambda ratio"] == "5: own bench"
+
+
+@pytest.mark.parametrize("cited", [["film"], "film", {"film": 1}])
+def test_sources_are_texts_by_part(cited):
+    with pytest.raises(InputError, match="source"):
+        hipuq.lubrication(sources=cited)

@@ -220,3 +220,25 @@ def test_the_interval_of_a_share_is_wilsons(hits, n, confidence):
     assert float(results["probability"]) == hits / n
     assert float(results["probability_low"]) == pytest.approx(low, abs=1e-12)
     assert float(results["probability_high"]) == pytest.approx(high, abs=1e-12)
+
+
+@pytest.mark.parametrize("n", [16, 64])
+def test_few_configurations_that_carry_a_mean_leave_it_open(n):
+    """A probability that is 0 in nine of ten configurations: t limits hold in 69 and 90 % (of 95 %)."""
+    rng = np.random.default_rng(3)
+    inputs = hipuq.Inputs(x=cp.Uniform(0.0, 1.0))
+    held = 0
+    for _ in range(300):
+        values = (rng.random(n) < 0.09) * rng.random(n) * 0.2
+        outcomes = xr.Dataset({"p": ("sample", values, {"role": "probability", "units": "1"})})
+        found = hipuq.estimate("monte_carlo", outcomes, inputs, of="p")
+        held += float(found["probability_low"]) <= 0.009 <= float(found["probability_high"])
+    assert held >= 0.92 * 300
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0])
+def test_what_never_came_may_be_rare(value):
+    outcomes = xr.Dataset({"p": ("sample", np.full(32, value), {"role": "probability", "units": "1"})})
+    found = hipuq.estimate("monte_carlo", outcomes, hipuq.Inputs(x=cp.Uniform(0.0, 1.0)), of="p")
+    low, high = (float(found[f"probability_{end}"]) for end in ("low", "high"))
+    assert [low, high] == pytest.approx([0.0, 0.1072] if value == 0 else [0.8928, 1.0], abs=1e-4)

@@ -36,6 +36,7 @@ def test_ranges_are_those_of_the_unstable_samples_alone():
 def test_unknown_verdicts_are_not_unstable():
     found = hipuq.frequency_ranges(outcomes_of([[1.0, 2.0]], [[np.nan, 1.0]]))
     assert found["unstable_samples"].values.tolist() == [0, 1]
+    assert found["known_samples"].values.tolist() == [0, 1]
     assert float(found["frequency_median"][1]) == 2.0
 
 

@@ -1,14 +1,13 @@
-"""Figures of contact patterns and of the frequencies of unstable modes."""
+"""Figures of contact patterns: boxes of their probabilities, and which are in contact."""
 
 from itertools import pairwise
 
 import numpy as np
 import pytest
-import xarray as xr
-from drawing import assert_inside, drawn, labels, texts
+from drawing import assert_inside, drawn, texts
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
-from plot_results import ONE, by_mode, literature, patterns
+from plot_results import ONE, by_mode, patterns
 
 from hipuq import plots
 from hipuq.errors import InputError, SchemaError
@@ -53,7 +52,7 @@ def test_boxes_are_quartiles_over_the_patterns():
     ]
     assert "whiskers: minimum, maximum" in legend(ax)
     assert (ax.get_xlabel(), ax.get_ylabel()) == (
-        "mode, by ascending frequency",
+        "mode, by ascending frequency\nnot shown: 1 (never unstable)",
         "probability: mode unstable [%]",
     )
     assert len({group[0].get_hatch() for group in ax.containers}) == 3
@@ -68,6 +67,28 @@ def test_boxes_of_chosen_modes_and_counts_stand_beside_each_other():
     assert left[0] < 0 < right[0] < 0.5 < left[1]
     own = Figure().subplots()
     assert plots.boxplots(by_mode(), ax=own) is own
+
+
+def test_boxes_are_of_all_modes_that_are_unstable_up_to_twelve():
+    ten, many = (plots.boxplots(by_mode(modes=number)) for number in (11, 16))
+    assert [text.get_text() for text in ten.get_xticklabels()] == [str(mode) for mode in range(2, 12)]
+    assert [text.get_text() for text in many.get_xticklabels()] == [str(mode) for mode in range(5, 17)]
+    assert many.get_xlabel().endswith("\nnot shown: 1 (never unstable); 2-4 (unstable too)")
+    assert_inside(many)
+    # Modes that are not known to be stable are among them; two are no range, as that of a pair would be.
+    results = by_mode(modes=4)
+    results["probability"][:, 1:3] = 0.0
+    results["probability"][0, 0] = np.nan
+    assert plots.boxplots(results).get_xlabel().endswith("\nnot shown: 2, 3 (never unstable)")
+
+
+@pytest.mark.parametrize(("factor", "top"), [(1.0, 104.0), (0.3, None), (0.0, 104.0)])
+def test_boxes_of_small_probabilities_have_the_axis_to_themselves(factor, top):
+    results = by_mode()
+    results["probability"] = factor * results["probability"]
+    largest = 100 * float(results["probability"].max())
+    assert plots.boxplots(results, modes=[2, 3]).get_ylim()[1] <= (top or 1.1 * largest)
+    assert plots.boxplots(results).get_ylim()[1] == pytest.approx(top or 1.1 * largest)
 
 
 def test_a_single_pattern_collapses_and_unknown_ones_are_told():
@@ -166,6 +187,24 @@ def test_all_patterns_of_nine_and_a_single_one_are_readable():
     assert right - left >= 8
 
 
+@pytest.mark.parametrize(
+    ("values", "ends"),
+    [
+        (0.0, (0, 100)),
+        (np.nan, (0, 100)),
+        (0.004, (0, 10)),
+        (0.503, (50, 60)),
+        (0.6, (50, 60)),
+        (1.0, (90, 100)),
+    ],
+)
+def test_probabilities_that_are_alike_look_alike(values, ends):
+    results = patterns()
+    results["probability"] = 0 * results["probability"] + values
+    norm = meshes(plots.pattern_map(results))[0].norm
+    assert (norm.vmin, norm.vmax) == pytest.approx(ends)
+
+
 def test_pattern_map_refuses():
     results = patterns()
     with pytest.raises(SchemaError, match="'probability' over"):
@@ -178,76 +217,3 @@ def test_pattern_map_refuses():
         plots.pattern_map(results.drop_vars("in_contact"))
     with pytest.raises(InputError, match="number in contact 7"):
         plots.pattern_map(results, counts=[7])
-
-
-# Frequencies of unstable modes
-
-
-def frequencies(median=(np.nan, 2000.0, 2500.0), reach=200.0):
-    said = {"long_name": "frequency", "units": "Hz"}
-    ends = {"low": -reach, "median": 0.0, "high": reach}
-    data = {f"frequency_{key}": ("mode", np.asarray(median) + own, said) for key, own in ends.items()}
-    coords = {"mode": np.arange(1, len(median) + 1)}
-    return xr.Dataset(data, coords=coords, attrs={"levels": [0.05, 0.5, 0.95]})
-
-
-SQUEAK = literature([np.nan, np.nan], [2000.0, 5000.0], [8000.0, 9000.0], ["dry", "edge"], "Hz")
-
-
-def test_ranges_are_in_kilohertz_beside_what_was_measured():
-    ax = drawn(plots.mode_frequencies(frequencies(), measured=SQUEAK))
-    np.testing.assert_allclose(
-        [part[:, 0] for part in ax.collections[0].get_segments()], [(1.8, 2.2), (2.3, 2.7)]
-    )
-    np.testing.assert_allclose(ax.lines[0].get_xdata(), [2.0, 2.5])
-    assert [text.get_text() for text in ax.get_yticklabels()] == ["2", "3"]
-    assert (ax.get_xlabel(), ax.get_ylabel()) == (
-        "frequency where unstable [kHz]",
-        "mode, by ascending frequency",
-    )
-    bands = [(shown.get_x(), shown.get_x() + shown.get_width()) for shown in ax.patches[:2]]
-    np.testing.assert_allclose(bands, [(2, 8), (5, 9)])
-    assert len({shown.get_hatch() for shown in ax.patches[:2]}) == 2
-    assert {
-        "squeak measured, dry: 2 to 8 kHz",
-        "5 to 95 % of the samples where unstable",
-        "never unstable, not drawn: 1 of 3 modes",
-    } <= set(labels(ax))
-    assert not ax.child_axes
-    assert_inside(ax)
-
-
-def test_ranges_too_narrow_to_be_seen_are_enlarged():
-    ax = drawn(plots.mode_frequencies(frequencies(reach=1.0, median=(2000.0, 2010.0)), measured=SQUEAK))
-    (inset,) = ax.child_axes
-    assert inset.get_xlim()[1] - inset.get_xlim()[0] < 0.03
-    np.testing.assert_allclose(inset.lines[0].get_xdata(), [2.0, 2.01])
-    assert [text.get_text() for text in inset.get_yticklabels()] == ["1", "2"]
-
-
-def test_modes_stand_at_their_probability():
-    values = {
-        "probability": [0.0, 0.3, 0.1],
-        "probability_low": [0.0, 0.2, 0.05],
-        "probability_high": [0.1, 0.4, 0.2],
-    }
-    data = {name: ("mode", own, ONE) for name, own in values.items()}
-    results = xr.Dataset(data, coords={"mode": [1, 2, 3]}, attrs={"confidence": 0.95})
-    ax = drawn(plots.mode_frequencies(frequencies(), results))
-    np.testing.assert_allclose(ax.lines[0].get_ydata(), [30, 10])
-    assert ax.get_ylabel() == "probability: mode unstable [%]"
-    assert texts(ax) == ["2", "3"]
-    assert "probability, 95 % interval" in labels(ax)
-    with pytest.raises(SchemaError, match=r"of modes \[1, 2\], not"):
-        plots.mode_frequencies(frequencies(), results.isel(mode=[0, 1]))
-    with pytest.raises(SchemaError, match="'probability' over"):
-        plots.mode_frequencies(frequencies(), results.drop_vars("probability"))
-
-
-def test_no_mode_is_ever_unstable_and_what_is_refused():
-    ax = drawn(plots.mode_frequencies(frequencies([np.nan] * 2), measured=SQUEAK))
-    assert "never unstable, not drawn: 2 of 2 modes" in labels(ax)
-    with pytest.raises(SchemaError, match="'frequency_median' over"):
-        plots.mode_frequencies(frequencies().drop_vars("frequency_median"))
-    with pytest.raises(SchemaError, match="measured needs 'low' over"):
-        plots.mode_frequencies(frequencies(), measured=SQUEAK.drop_vars("low"))

@@ -14,6 +14,7 @@ from hipuq import plots
 from hipuq.errors import InputError, SchemaError
 
 CALIBRATED = "oberst2016-calibrated"
+LEFT_OUT = "not shown: 1-10 (never unstable)"
 PAPER_NAMES = {12: "11", 14: "14", 16: "15", 18: "18"}
 
 
@@ -129,7 +130,11 @@ def test_data_is_not_changed(name, results, shapes, sweep):
 @pytest.mark.parametrize(
     ("name", "x", "y"),
     [
-        ("occurrence", "pair of modes, by ascending frequency", "probability: mode unstable [%]"),
+        (
+            "occurrence",
+            f"pair of modes, by ascending frequency\n{LEFT_OUT}",
+            "probability: mode unstable [%]",
+        ),
         ("mode_shape", "x [radii]", "y [radii]"),
         ("frequency_over_friction", "friction coefficient [1]", "frequency [Hz]"),
         ("growth_over_friction", "friction coefficient [1]", "growth rate [1/s]"),
@@ -160,7 +165,8 @@ def test_occurrence_names_pairs_and_paper(results):
     ax = plots.occurrence(results, 9, modes=[12, 14, 16, 18], names=PAPER_NAMES)
     ticks = [tick.get_text() for tick in ax.get_xticklabels()]
     assert ticks == ["11-12\n(11)", "13-14\n(14)", "15-16\n(15)", "17-18\n(18)"]
-    assert "paper" in ax.get_xlabel()
+    # Modes that nobody asked for need no word.
+    assert ax.get_xlabel() == "pair of modes, by ascending frequency (name in the paper)"
 
 
 def test_single_pattern_has_no_spread(results):
@@ -199,6 +205,7 @@ def test_occurrence_panels(results):
     assert titles[0] == "(a) 6 in contact, 84 patterns"
     assert titles[3] == "(d) 9 in contact, 1 pattern"
     figure = axes[0, 0].figure
+    assert figure.get_supxlabel().endswith(f"(name in the paper)\n{LEFT_OUT}")
     assert figure.get_supylabel() == "probability: mode unstable [%]"
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert sorted(texts) == ["maximum", "mean, 95 % interval", "minimum"]
@@ -305,7 +312,7 @@ def test_mode_shape_is_scaled(shapes):
     assert length.argmax() == 0
     true = shapes["displacement_real"].sel(mode=18).values
     np.testing.assert_allclose(moved / 0.25, true / np.hypot(*true.T).max(), atol=1e-12)
-    assert ax.get_title() == "mode 18: 2323.2 Hz, growth rate 14.6 1/s"
+    assert ax.get_title() == "mode 18: 2323.2 Hz, growth rate 14.6 1/s (growing)"
     assert [text.get_text() for text in ax.texts] == [str(i) for i in range(1, 10)]
     assert ax.get_aspect() == 1.0
 
@@ -313,6 +320,15 @@ def test_mode_shape_is_scaled(shapes):
 def test_mode_shape_of_other_scale_and_no_motion(shapes):
     assert "deformed (largest: 0.5 radii)" in labels(plots.mode_shape(shapes, 1, scale=0.5))
     drawn(plots.mode_shape(shapes.assign(displacement_real=0 * shapes["displacement_real"]), 1))
+
+
+def test_mode_shape_tells_where_it_is_as_far_as_is_known(shapes):
+    told = shapes.assign_coords(friction=0.1).assign_attrs(damping_ratio=0.005)
+    first, second = plots.mode_shape(told, 17).get_title().split("\n")
+    assert first.endswith("-14.6 1/s (decaying)")
+    assert second == "friction 0.1, damping ratio 0.5 %"
+    still = plots.mode_shape(told.assign(growth_rate=0 * shapes["growth_rate"]).drop_vars("friction"), 1)
+    assert still.get_title().endswith("growth rate 0 1/s\ndamping ratio 0.5 %")
 
 
 def test_mode_shape_refuses(shapes, sweep):
@@ -381,7 +397,13 @@ def test_sweep_without_instability(sweep, damped):
     for outcomes in (below, damped):
         assert np.isnan(plots.lock_in_bracket(outcomes, 18)).all()
         axes = plots.lock_in(outcomes)
-        assert not any("lock-in" in label for ax in axes.flat for label in labels(drawn(ax)))
+        end = float(outcomes["friction"].max())
+        for ax in axes.flat:
+            said = [label for label in labels(drawn(ax)) if "lock-in" in label]
+            assert said in (
+                [f"never unstable: no lock-in up to friction {end:.4g}"],
+                [f"never unstable where known: no lock-in up to friction {end:.4g}"],
+            )
         assert labels(drawn(plots.dispersion(outcomes)[0])) == ["never unstable"]
         drawn(plots.root_locus(outcomes))
         assert labels(drawn(plots.damping_over_frequency(outcomes))) == ["stable"]
@@ -428,7 +450,8 @@ def test_growth_of_undecided_modes_is_not_drawn(sweep):
     unknown = sweep.assign(unstable=sweep["unstable"] * np.nan)
     ax = drawn(plots.growth_over_friction(unknown, [17, 18]))
     assert np.isnan(line(ax, "mode 18").get_ydata()).all()
-    assert labels(ax) == ["mode 17", "mode 18", "undecided"]
+    end = "never unstable where known: no lock-in up to friction 0.1"
+    assert labels(ax) == ["mode 17", "mode 18", "undecided", end]
     axes = plots.dispersion(unknown)
     assert all(np.isnan(shown.get_ydata()).all() for shown in axes[0].lines[:18])
     assert plots.root_locus(unknown).collections[0].get_offsets().size == 0
@@ -446,6 +469,12 @@ def test_lock_in_panels(sweep):
     assert [ax.get_ylabel() for ax in axes[:, 0]] == ["frequency [Hz]", "growth rate [1/s]"]
     assert axes[1, 0].get_xlabel() == "friction coefficient [1]"
     assert plots.lock_in(sweep, [(11, 12)]).shape == (2, 1)
+    # Beside other figures it matters where modes have these numbers.
+    title = axes[1, 0].get_legend().get_title().get_text()
+    where = float(plots.follow_modes(sweep)["reference_friction"])
+    assert title == f"modes numbered by frequency at friction {where:.4g}"
+    assert plots.dispersion(sweep)[-1].get_legend().get_title().get_text() == title
+    assert not any("no lock-in" in label for ax in axes.flat for label in labels(ax))
     with pytest.raises(InputError, match="pairs are empty"):
         plots.lock_in(sweep, [])
 

@@ -1,10 +1,13 @@
 """Figures of the probability of instability: over a parameter, over two, by number in contact."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import xarray as xr
 from drawing import assert_inside, drawn, labels, texts
 from matplotlib.collections import QuadMesh
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from plot_results import ANY, DAMPING, FALLING, literature, on_grid, over_two, patterns, swept
 
@@ -62,11 +65,25 @@ def test_stratified_results_are_drawn_overall():
 
 def test_overlaid_results_are_told_apart_in_grey():
     ax = drawn(plots.probability_over({"a": swept(), "b": swept(FALLING / 2)}))
-    assert labels(ax) == ["a, 95 % interval", "b, 95 % interval"]
+    # What bands are is said once.
+    assert labels(ax) == ["a", "b", "bands: 95 % interval"]
     first, second = ax.lines
-    assert first.get_linestyle() != second.get_linestyle()
-    assert first.get_marker() != second.get_marker()
     assert first.get_color() != second.get_color()
+    exact = swept(confidence=1.0)
+    ends = ["95 % interval", "limits of the unknown"]
+    assert labels(plots.probability_over({"a": swept(), "b": exact})) == [f"a, {ends[0]}", f"b, {ends[1]}"]
+
+
+def test_neighbouring_curves_differ_in_all_that_grey_print_shows():
+    curves = {str(i): swept(FALLING / (1 + i)) for i in range(6)}
+    lines = drawn(plots.probability_over(curves)).lines
+    grey = [np.dot(to_rgb(line.get_color()), (0.299, 0.587, 0.114)) for line in lines]
+    for i, (one, other) in enumerate(pairwise(lines)):
+        assert abs(grey[i] - grey[i + 1]) > 0.1
+        assert abs(one.get_linewidth() - other.get_linewidth()) > 1
+        assert (one.get_markerfacecolor() == "white") != (other.get_markerfacecolor() == "white")
+    assert len({line.get_marker() for line in lines}) == 6
+    assert len({str(line._dash_pattern) for line in lines}) == 6
 
 
 def test_incidence_is_a_hatched_band_of_another_quantity():
@@ -176,6 +193,10 @@ def test_by_count_shows_mean_interval_and_range():
     assert ax.get_ylabel() == "probability: any mode unstable [%]"
     assert {"mean, 95 % interval", "exact", "range over the patterns"} <= set(labels(ax))
     assert_inside(ax)
+    assert ax.get_legend().get_window_extent().y1 < ax.xaxis.label.get_window_extent().y0
+    assert ax.get_ylim() == pytest.approx((-4, 104))
+    small = plots.by_count(0.5 * results.drop_vars("contact"), exact=0.6 * results.drop_vars("contact"))
+    assert small.get_ylim()[1] == pytest.approx(1.1 * 60 * float(results["probability_max"].max()))
 
 
 def test_by_count_marks_what_is_unknown_and_refuses():
@@ -202,18 +223,19 @@ def mesh(ax):
 
 
 def cells(ax):
-    """Return the values of cells read back from their colours and the positions of their middles."""
+    """Return the edges of cells, and their values read back from the colours."""
     shown = mesh(ax)
     corners = shown.get_coordinates()
-    x, y = corners[0, :, 0], corners[:, 0, 1]
-    return (x[1:] + x[:-1]) / 2, (y[1:] + y[:-1]) / 2, np.ma.filled(shown.get_array().astype(float), np.nan)
+    return corners[0, :, 0], corners[:, 0, 1], np.ma.filled(shown.get_array().astype(float), np.nan)
 
 
 def test_map_of_a_sweep_over_two_parameters():
     ax = drawn(plots.stability_map(over_two(STEEP), "friction", "damping_ratio"))
     x, y, values = cells(ax)
-    np.testing.assert_allclose(x, np.linspace(0, 0.1, 4))
-    np.testing.assert_allclose(y, [0, 0.5, 1])
+    # Halfway between values, and none beyond the outermost.
+    np.testing.assert_allclose(x, [0, 0.1 / 6, 0.05, 0.5 / 6, 0.1])
+    np.testing.assert_allclose(y, [0, 0.25, 0.75, 1])
+    assert ax.get_xlim() == pytest.approx((0, 0.1)) and ax.get_ylim() == pytest.approx((0, 1))
     np.testing.assert_allclose(values, 100 * STEEP)
     assert mesh(ax).norm.vmin == 0 and mesh(ax).norm.vmax == 100
     assert ax.get_xlabel() == "friction coefficient [1]"
@@ -297,3 +319,37 @@ def test_stability_map_refuses():
         plots.stability_map(over_two(STEEP), x, y, of="margin")
     with pytest.raises(SchemaError, match="'probability' over"):
         plots.stability_map(xr.Dataset({"friction": 1.0}), x, y)
+
+
+def test_dollars_in_names_are_no_mathematics(tmp_path):
+    curve = swept(FALLING)
+    ax = plots.probability_over({"$\\frac{$": curve, "b": curve})
+    ax.figure.savefig(tmp_path / "a.png")
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert any("frac" in name for name in names)
+
+
+@pytest.mark.parametrize("quantity", ["critical_friction", "squeak_frequency"])
+def test_other_published_figures_are_no_incidence(quantity):
+    with pytest.raises(SchemaError, match=f"is of '{quantity}': it must be of 'incidence'"):
+        plots.probability_over(swept(FALLING), literature=hipuq.literature(quantity))
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda: plots.probability_over(None),
+        lambda: plots.probability_over({"a": 1}),
+        lambda: plots.boxplots(None),
+        lambda: plots.by_count([]),
+        lambda: plots.pattern_map(3),
+        lambda: plots.mode_frequencies(None),
+        lambda: plots.stability_map(None, "x", "y"),
+        lambda: plots.onset_distribution(None),
+        lambda: plots.fragility(None),
+        lambda: plots.probability_over(swept(FALLING), literature=3),
+    ],
+)
+def test_what_is_no_dataset_is_told(draw):
+    with pytest.raises(SchemaError, match=r"must be a"):
+        draw()

@@ -85,7 +85,17 @@ def test_the_most_telling_parameter_in_words():
 def test_words_of_others(names, first, total, said):
     text = in_words(sobol(names, first, total))
     assert said in text
-    assert ("together" in text) is (len(names) > 1 and not np.isnan(first).any())
+    assert ("together" in text) is (len(names) > 1 and sum(first) >= max(first))
+
+
+def test_shares_that_cannot_be_added_up_are_not():
+    """First-order indices of little say, or below 0, add up to less than the largest of them."""
+    assert "together" not in in_words(sobol(["k1", "k2"], [0.79, -0.02], [0.9, 0.1]))
+    text = in_words(sobol(["k1", "k2", "k3"], [0.5, 0.3, -0.04], [0.7, 0.4, 0.1]))
+    assert "together" not in text
+    assert "k1 explains 50 % (47 to 53 %) of the variance alone, 70 %" in text
+    text = in_words(sobol(["k1", "k2"], [-0.04, -0.01], [0.9, 0.1]))
+    assert "k1 explains 90 % (87 to 93 %) of the variance with its interactions" in text
 
 
 def test_wide_intervals_resolve_nothing():

@@ -46,8 +46,9 @@ def test_all_undecided_is_no_number():
 
 def test_exact_and_other_methods_in_words():
     exact = results(0.25, 0.25, 0.25, confidence=1.0)
-    assert lead(exact) == "P(squeak) = 0.25000000; exact: every level of the inputs once, 1,000 evaluations"
-    assert "(bounds 0.20000000 to" in lead(results(0.25, 0.2, 0.3, confidence=1.0))
+    assert lead(exact) == "P(squeak) = 0.2500; exact: every level of the inputs once, 1,000 evaluations"
+    assert "= 1.23e-05; exact" in lead(results(1.23e-5, 1.23e-5, 1.23e-5, confidence=1.0))
+    assert "(bounds 0.2000 to 0.3000)" in lead(results(0.25, 0.2, 0.3, confidence=1.0))
     words = lead(results(0.5, 0.4, 0.6, sampler="sobol", stratify="contact"))
     assert words.endswith("; Monte Carlo, Sobol points, stratified by contact, 1,000 evaluations")
     assert "polynomial chaos corrected by true evaluations" in lead(results(0.5, 0.4, 0.6, method="chaos"))
@@ -134,7 +135,8 @@ def test_the_study_chooses_the_headline():
     assert "as the study asks" in headline(reread(everything(), headline="exact")).lines[2]
     reading = reread(everything(), headline="drivers")
     assert reading.analysis == "squeak"
-    assert "'drivers', which the study asks for, gives no such probability" in headline(reading).lines[2]
+    assert "'drivers', which the study asks for, gives no such probability" in headline(reading).lines[3]
+    assert any("gives no such probability" in line for line in headline(reading).brief)
 
 
 def test_an_analysis_over_friction_is_the_last_choice_and_a_fragility_curve():
@@ -156,7 +158,9 @@ def test_an_analysis_over_friction_is_the_last_choice_and_a_fragility_curve():
     [
         ([0.9, 0.5, 0.1], "falls from 0.9000 (0.8000 to 1.0000) at 0 % to 0.1000"),
         ([0.5, 0.9, 0.1], "not falling throughout: it lies between 0.1000 and 0.9000"),
-        ([0.5, 0.5, 0.5], "stays: 0.5000"),
+        ([0.5, 0.5, 0.5], "P(squeak) is 0.5000 at every damping ratio, 0 % to 2 %"),
+        ([1.0, 1.0, 1.0], "P(squeak) is 1 at every damping ratio, 0 % to 2 %"),
+        ([np.nan, 0.0, 0.0], "P(squeak) is 0 at every damping ratio with a verdict"),
         ([np.nan, 0.5, np.nan], "the one value with a verdict"),
         ([np.nan] * 3, "not known at any damping ratio"),
     ],
@@ -184,5 +188,17 @@ def test_a_model_of_the_user_has_a_plain_headline():
 
 def test_nothing_to_tell():
     assert blocks(Reading(tree({}))) == []
-    text = headline(Reading(without(everything(), "squeak", "exact"))).lines
+    text = headline(Reading(without(everything(), "squeak", "exact", "drivers/any_unstable"))).lines
     assert text[0].startswith("No analysis gives a probability of any unstable mode")
+
+
+def test_an_analysis_of_indices_alone_tells_the_mean_of_the_verdict():
+    drivers = everything()["drivers/any_unstable"].to_dataset()
+    text = headline(Reading(without(everything(), "squeak", "exact"))).lines
+    assert text[0].startswith(f"P(squeak) = {float(drivers['mean']):.3f} at 1 % modal damping, the mean of")
+    assert "Sobol indices, 256 evaluations" in text[0]
+    assert text[1].startswith("It has no interval")
+    ends = {f"mean_{end}": float(drivers["mean"]) + by for end, by in (("low", -0.1), ("high", 0.1))}
+    told = headline(Reading(tree({"drivers/any_unstable": drivers.assign(ends)}))).lines
+    assert len(told) == 1
+    assert f"to {ends['mean_high']:.2f})" in told[0]

@@ -70,7 +70,7 @@ def test_exact_results_have_neither_seed_nor_interval(tree):
 def test_exact_probabilities_have_eight_decimals(tree, exact):
     assert headline(exact).endswith(f": {float(exact['probability_overall']):.8f}")
     (table,) = tables(exact)
-    assert table.columns == ["oscillators in contact", "levels", "mean", "minimum", "maximum"]
+    assert table.columns == ["oscillators in contact", "patterns", "mean", "minimum", "maximum"]
     known = f"{published.PROBABILITY_ANY_UNSTABLE['oberst2016'][9]:.8f}"
     assert table.rows[1] == ["9", "1", known, known, known]
     assert known in shown(tree)["certain"]

@@ -1,6 +1,7 @@
 """Studies over the damping ratio: what they add by themselves, keep beside results, and refuse."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -66,12 +67,44 @@ def test_a_study_adds_the_sweep_over_damping_by_itself(tmp_path):
         SMALL_STUDY
         + SAMPLED
         + '[analysis.inputs.damping_ratio]\ndistribution = "uniform"\nlower = 0.0\nupper = 0.02\n',
-        SMALL_STUDY + SAMPLED.replace('["unstable", "any_unstable"]', '"margin"'),
+        SMALL_STUDY + SAMPLED + "over = { friction = [0.02, 0.1] }\n",
     ],
-    ids=["over", "none asked for", "an input", "no probability"],
+    ids=["over", "none asked for", "an input", "no friction"],
 )
 def test_it_adds_none_where_damping_is_told_or_nothing_asked(text, tmp_path):
     assert [one.implied for one in load(tmp_path, text).analyses] == [False]
+
+
+@pytest.mark.parametrize("changed", [("monte_carlo", "sobol"), ('["unstable", "any_unstable"]', '"margin"')])
+def test_a_study_without_a_probability_gets_one_from_the_sweep(changed, tmp_path):
+    text = (
+        SAMPLED.replace(*changed)
+        .replace('options = { stratify = "contact" }\n', "")
+        .replace("n = 4", "n = 16")
+    )
+    study = load(tmp_path, SMALL_STUDY + text.replace('["unstable", "any_unstable"]', '"any_unstable"'))
+    assert [one.name for one in study.analyses] == ["sampled", DAMPING_SWEEP]
+
+
+def test_its_values_hold_the_damping_of_the_headline(tmp_path):
+    text = SMALL_STUDY + SAMPLED + "model = { damping_ratio = 0.2 }\n"
+    first, added = load(tmp_path, text).analyses
+    assert added.over["damping_ratio"][-1] == 0.2
+    assert added.n == first.n
+    tree = hipuq.run_study(load(tmp_path, text), tmp_path / "out", progress=False)
+    there = tree["sampled/any_unstable"].to_dataset()
+    here = at(tree[f"{DAMPING_SWEEP}/any_unstable"].to_dataset(), damping_ratio=0.2)
+    # The same draws: no two answers to one question.
+    np.testing.assert_array_equal(here["probability_overall"], there["probability_overall"])
+
+
+def test_the_study_and_its_report_have_one_headline(tmp_path):
+    over = SAMPLED + "over = { friction = [0.02, 0.1], damping_ratio = [0.0, 0.01] }\n"
+    last = SAMPLED.replace('"sampled"', '"last"')
+    study = load(tmp_path, SMALL_STUDY + over + last)
+    assert study.report.headline == "last"
+    with pytest.raises(StudyError, match="which the headline's analysis 'last' is not over"):
+        load(tmp_path, f"{SMALL_STUDY}{over}{last}[report]\ndamping_ratio = 0.01\n")
 
 
 def test_the_added_sweep_samples_friction_that_the_headline_integrates(tmp_path):
@@ -85,7 +118,7 @@ def test_the_added_sweep_samples_friction_that_the_headline_integrates(tmp_path)
     assert float(found["probability"][1]) < float(found["probability"][0])
 
 
-def test_its_seed_depends_on_its_name_alone(tmp_path):
+def test_its_seed_is_that_of_its_headline(tmp_path):
     seeds = []
     for i, text in enumerate((SAMPLED, SAMPLED + SAMPLED.replace('"sampled"', '"second"'))):
         tree = run(tmp_path / str(i), SMALL_STUDY + text + "[report]\ndamping_ratios = [0.0]\n")
@@ -106,6 +139,16 @@ def test_a_swept_analysis_keeps_everything_by_value(tmp_path):
     assert sorted(set(outcomes["damping_ratio"].values.tolist())) == [0.0, 0.01]
     counted = tree["sampled/verdicts"]["samples"].sum("status").values
     assert counted.tolist() == tree["sampled/any_unstable"]["evaluations"].values.tolist()
+
+
+def test_a_sweep_over_friction_has_a_friction_limit(tmp_path):
+    text = (
+        SMALL_STUDY + SAMPLED + "over = { damping_ratio = [0.0, 0.02], friction = [0.0, 0.05, 0.2, 0.4] }\n"
+    )
+    limits = run(tmp_path / "s", text)["sampled/friction_limit"].to_dataset()
+    assert limits["friction_limit"].dims == ("damping_ratio", "target")
+    low, high = limits["friction_limit"].sel(target=0.1)
+    assert float(low) < float(high)
 
 
 def test_what_an_analysis_is_over_is_no_input_of_it(tmp_path):
@@ -131,6 +174,16 @@ def test_integrated_friction_leaves_fragility_onsets_and_limits(tmp_path):
     xr.testing.assert_identical(
         changed["integrated/probability"].to_dataset(), tree["integrated/probability"].to_dataset()
     )
+
+
+def test_what_depends_on_no_key_of_the_report_is_kept_without_outcomes(tmp_path):
+    text = SMALL_STUDY + INTEGRATED + "[report]\ndamping_samples = 0\nfragility_points = 11\n"
+    first = run(tmp_path / "s", text)
+    shutil.rmtree(tmp_path / "s" / "out" / "outcomes")
+    said: list[str] = []
+    again = run(tmp_path / "s", text.replace("= 11", "= 21"), resume=True, say=said.append)
+    assert set(again["integrated"].children) == set(first["integrated"].children) - {"fragility"}
+    assert any("fragility cannot be made from the outcomes that are stored" in line for line in said)
 
 
 def test_the_root_says_what_is_needed_to_repeat_it(tmp_path):

@@ -1,5 +1,6 @@
 """An analysis over values of a parameter: the same numbers as one analysis at each, with the same draws."""
 
+import itertools
 import json
 
 import chaospy as cp
@@ -8,9 +9,9 @@ import pytest
 import xarray as xr
 
 import hipuq
+from hipuq.combinations import at, gathered, swept
 from hipuq.errors import InputError, SchemaError
 from hipuq.methods import METHODS
-from hipuq.sweeping import at, gathered, swept
 
 RATIOS = [0.0, 0.005, 0.02]
 
@@ -100,7 +101,7 @@ def test_a_plain_function_can_be_swept():
     results = hipuq.sweep(
         above, inputs, {"level": np.array([0.25, 1.0])}, method="monte_carlo", n=64, of="above", rng=1
     )
-    assert float(at(results, level=1.0)["mean"] if "mean" in results else results["probability"][1]) == 0.0
+    assert results["probability"].values.tolist() == [pytest.approx(0.75, abs=0.15), 0.0]
 
 
 @pytest.mark.parametrize(
@@ -117,6 +118,10 @@ def test_a_plain_function_can_be_swept():
         ({"damping_ratio": [np.nan]}, "finite numbers that ascend"),
         ({"damping_ratio": ["a"]}, "finite numbers that ascend"),
         ({"damping_ratio": 0.01}, "finite numbers that ascend"),
+        ({"damping_ratio": ["0.0", "0.01"]}, "finite numbers that ascend"),
+        ({"damping_ratio": [False, True]}, "finite numbers that ascend"),
+        ({"damping_ratio": itertools.count()}, "more than 10,000 combinations"),
+        ({"damping_ratio": [-0.1, 0.0]}, "must be a finite number not below 0"),
         ({"damping_ratio": np.linspace(0, 1, 10_001)}, "more than 10,000 combinations"),
     ],
 )
@@ -126,10 +131,32 @@ def test_what_cannot_be_swept_is_one_line(over, said, ring, inputs):
     assert "\n" not in str(error.value)
 
 
-def test_names_that_results_use_are_refused():
+@pytest.mark.parametrize("name", ["mode", "mean", "probability_low", "S1", "of", "seconds", "a b", ""])
+def test_names_that_results_use_are_refused(name):
     inputs = hipuq.Inputs(x=cp.Uniform(0.0, 1.0))
     with pytest.raises(InputError, match="results use the name"):
-        hipuq.sweep(lambda s: s, inputs, {"mode": [1.0]}, method="monte_carlo", n=8, of="y")
+        hipuq.sweep(lambda s: s, inputs, {name: [1.0]}, method="monte_carlo", n=8, of="y")
+
+
+def test_what_is_said_of_a_variable_stays_with_its_value(tmp_path, ring):
+    """Reasons why an index is undefined are those of one value of the sweep, not of the first."""
+    inputs = ring.inputs(friction=cp.Uniform(0.0, 0.2), contact=hipuq.ContactPatterns(in_contact=(8, 9)))
+    over = {"damping_ratio": [0.0, 0.5]}
+    results = hipuq.sweep(ring, inputs, over, method="sobol", n=128, of="any_unstable", rng=1, progress=False)
+    hipuq.save_results(results, tmp_path / "r.nc")
+    results = hipuq.load_results(tmp_path / "r.nc").to_dataset()
+    for ratio in over["damping_ratio"]:
+        model = hipuq.models.ring("oberst2016-calibrated", damping_ratio=ratio)
+        alone = hipuq.run(model, inputs, method="sobol", n=128, of="any_unstable", rng=1)
+        here = at(results, damping_ratio=ratio)
+        for name in ("S1", "ST", "S1_low"):
+            assert here[name].attrs == alone[name].attrs
+    assert "undefined" in at(results, damping_ratio=0.5)["S1"].attrs
+    assert "undefined" not in at(results, damping_ratio=0.0)["S1"].attrs
+
+
+def test_a_value_that_was_selected_is_no_dim_to_sweep(over_damping):
+    assert swept(over_damping.sel(damping_ratio=0.0)) == ()
 
 
 def test_a_value_that_is_not_there_is_one_line(over_damping):

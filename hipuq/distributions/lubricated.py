@@ -143,9 +143,13 @@ def lubrication(
             f"boundary_below is {boundary_below:g} and film_from {film_from:g}: "
             "the first must be less, and both finite"
         )
+    if sources is not None and not isinstance(sources, Mapping):
+        raise InputError(f"sources is {sources!r}: it must name parts with their sources, {{'film': '...'}}")
     cited = dict(sources or {})
-    for name in cited:
+    for name, text in cited.items():
         check_name("part that has a source", name, DEFAULTS)
+        if not isinstance(text, str):
+            raise InputError(f"the source of {name} is {text!r}: it must be text")
     given = {"film": film, "mixed": mixed, "boundary": boundary}
     parts = {name: _friction(name, value) for name, value in given.items()}
     weights, ratio = _weights(lambda_ratio, float(boundary_below), float(film_from))

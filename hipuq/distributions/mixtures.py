@@ -94,7 +94,8 @@ def mixture(
     """
     named = isinstance(components, Mapping)
     if not (named or isinstance(components, Sequence)) or isinstance(components, str):
-        raise InputError(f"components are {components!r}: they must be a list, or a dict by name")
+        shown = " ".join(repr(components).split())
+        raise InputError(f"components are {shown}: they must be a list, or a dict by name")
     names = [str(key) for key in components] if isinstance(components, Mapping) else [""] * len(components)
     values = list(components.values()) if isinstance(components, Mapping) else list(components)
     if not values:

@@ -59,17 +59,20 @@ def _lubrication(name: str, table: Mapping[str, Any]) -> Distribution:
     options, sources = dict(table), {}
     for part in DEFAULTS.keys() & options.keys():
         value = options[part]
-        if part == "lambda_ratio" and not _is_table(value):
-            continue
-        options[part] = _nested(part, value)
-        if value.get("source"):
+        if part != "lambda_ratio" or _is_table(value):
+            options[part] = _nested(part, value)
+        elif isinstance(value, Mapping):
+            # The probabilities of the regimes, or one value.
+            rest = {key: own for key, own in value.items() if key != "source"}
+            options[part] = rest["value"] if set(rest) == {"value"} else rest
+        if isinstance(value, Mapping) and value.get("source"):
             sources[part] = value["source"]
     return lubrication(**options, sources=sources)
 
 
 def _is_table(value: object) -> bool:
-    """Say whether a value is a table of a distribution; one of probabilities of regimes is not."""
-    return isinstance(value, Mapping) and ("distribution" in value or not value.keys() & set(REGIMES))
+    """Say whether a value is the table of a distribution, not of probabilities of regimes or of a value."""
+    return isinstance(value, Mapping) and ("distribution" in value or not value.keys() & {*REGIMES, "value"})
 
 
 def _nested(place: str, table: object) -> Distribution:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hipuq.estimation.reduction import Moments
 from hipuq.estimation.results import Kind
-from hipuq.intervals import replicated, student, wilson
+from hipuq.intervals import graded, replicated, student, wilson
 
 Array = NDArray[np.float64]
 
@@ -61,10 +61,11 @@ def _limit(cells: Moments, kind: Kind, confidence: float) -> tuple[Array, Array]
     """Return the limits between replicates, or those of the pooled draws where replicates agree."""
     pooled = cells.pooled()
     shares = kind.quantity == "probability" and not kind.graded
+    over_draws = graded if kind.graded else student
     if shares:
         single = wilson(pooled.total, pooled.known, confidence)
     else:
-        single = student(pooled.mean, pooled.squares, pooled.known, confidence)
+        single = over_draws(pooled.mean, pooled.squares, pooled.known, confidence)
     replicates = cells.known.shape[1]
     if replicates == 1:
         return single

@@ -61,8 +61,10 @@ LIMITS = (
     "friction "
     "measured at the onset of squeak, 0.29 to 0.39 (Fan et al., J. Orthop. Res. 31 (2013) 1627)",
     "Without damping the nominal ring of both presets was unstable in each of the 130 contact patterns at "
-    "every "
-    "friction tried from 0.1 to 1: with friction as it is measured the undamped model answers almost surely",
+    "every friction tried from 0.1 to 1, so with the film lost (friction 0.3 and above) the undamped model "
+    "answers almost surely",
+    "Calibrated means calibrated to a published simulation, the lock-in and the mode shapes of Oberst et al. "
+    "(2016), not to hips",
     "The growth behind that is small: calibrated, all nine in contact, 1.7 1/s at a friction of 0.054 and "
     "96 1/s "
     "at 0.1, which about 0.7 % modal damping removes; so damping decides, and it is hardly known",

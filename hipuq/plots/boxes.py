@@ -12,18 +12,24 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from hipuq.plots.captions import legend_below, over, wrapped
-from hipuq.plots.grouping import WAY_OUT, by_number, check_values, patterns
+from hipuq.plots.grouping import WAY_OUT, by_number, check_values, left_out, patterns
 from hipuq.plots.occurrences import LAST, mode_label, mode_tick
-from hipuq.plots.style import BLACK, FILLS, axis_label, new_axes
+from hipuq.plots.style import (
+    BLACK,
+    FILLS,
+    axis_label,
+    check_dataset,
+    new_axes,
+    percent_top,
+)
 
 Array = NDArray[np.float64]
 
 ROOM = 0.84
 """Share of the place of a mode that its boxes fill."""
 
-
-HALF = 50.0
-"""Probability [%] from which on the axis reaches to 100."""
+MOST = 12
+"""Modes shown by default at most."""
 
 
 def boxplots(
@@ -48,7 +54,8 @@ def boxplots(
     counts : sequence of int, optional
         Numbers in contact; all by default.
     modes : sequence of int, optional
-        Modes to show; by default the last eight of those that are not stable in every pattern shown.
+        Modes to show; by default those that are not stable in every pattern shown, the last twelve if
+        there are more. The label of the x axis then says which are left out.
     names : mapping, optional
         Mode number -> name that the source gives it, shown beneath.
     ax : Axes, optional
@@ -65,9 +72,11 @@ def boxplots(
     InputError
         If a number in contact or a mode is not in them.
     """
+    check_dataset(results, "results")
     probability = over(results, "probability", ("pattern", "mode"), WAY_OUT)
     groups = by_number(results, counts)
-    chosen = probability.sel(mode=_modes(probability, groups, modes))
+    ever = _ever(probability, groups)
+    chosen = probability.sel(mode=_modes(probability, ever, modes))
     values = 100 * chosen.values.astype(np.float64)
     ax = new_axes(ax, 8.0, 4.6)
     wide = ROOM / len(groups)
@@ -82,35 +91,30 @@ def boxplots(
     ax.set_xticks(place, [mode_tick(chosen, i, names or {}) for i in range(len(place))])
     ax.tick_params(axis="x", labelsize="small", length=0)
     ax.set_xlim(-0.5, len(place) - 0.5)
-    # All of 0 to 100 % where there is much, else boxes would be lines.
-    top = 100.0 if (largest := _largest(values)) > HALF else max(largest, 1.0)
-    ax.set_ylim(-0.04 * top, 1.04 * top)
+    top = percent_top(values)
+    ax.set_ylim(-top / 26, top)
     ax.grid(axis="y", linewidth=0.4, alpha=0.5)
     ax.set_axisbelow(True)
-    ax.set_xlabel(mode_label(chosen, names))
+    gone = "" if modes is not None else left_out(probability["mode"].values, ever, chosen["mode"].values)
+    ax.set_xlabel("\n".join(wrapped(ax, part) for part in (mode_label(chosen, names), gone) if part))
     ax.set_ylabel(wrapped(ax, axis_label(probability, "%"), upright=True))
     legend_below(ax, width=2.4, handles=handles)
     return ax
 
 
-def _largest(values: Array) -> float:
-    """Return the largest value; 0 where none is known."""
-    known = values[~np.isnan(values)]
-    return float(known.max()) if known.size else 0.0
-
-
-def _modes(
-    probability: xr.DataArray, groups: Mapping[int, NDArray[np.intp]], modes: Sequence[int] | None
-) -> list[int]:
-    """Return the modes to draw."""
-    here = probability["mode"].values.tolist()
-    if modes is not None:
-        return check_values("mode", modes, here)
+def _ever(probability: xr.DataArray, groups: Mapping[int, NDArray[np.intp]]) -> NDArray[np.bool_]:
+    """Say which modes are not stable in all patterns shown; what is unknown is not known to be stable."""
     shown = probability.values[np.concatenate(list(groups.values()))]
-    # What is unknown is not known to be stable.
-    ever = ~(shown == 0).all(axis=0)
-    found = [int(mode) for mode, kept in zip(here, ever, strict=True) if kept]
-    return (found or here)[-LAST:]
+    return np.asarray(~(shown == 0).all(axis=0))
+
+
+def _modes(probability: xr.DataArray, ever: NDArray[np.bool_], modes: Sequence[int] | None) -> list[int]:
+    """Return the modes to draw."""
+    here = probability["mode"].values
+    if modes is not None:
+        return check_values("mode", modes, here.tolist())
+    found = here[ever] if ever.any() else here[-LAST:]
+    return [int(mode) for mode in found[-MOST:]]
 
 
 def _boxes(ax: Axes, at: Array, values: Array, wide: float, label: str, fill: dict[str, Any]) -> None:

@@ -9,9 +9,17 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from hipuq.errors import InputError
-from hipuq.plots.captions import level, over, wrapped
+from hipuq.plots.captions import legend_below, level, over, wrapped
 from hipuq.plots.grouping import WAY_OUT
-from hipuq.plots.style import BLACK, BLUE, VERMILLION, axis_label, new_axes
+from hipuq.plots.style import (
+    BLACK,
+    BLUE,
+    VERMILLION,
+    axis_label,
+    check_dataset,
+    new_axes,
+    percent_top,
+)
 
 NEEDED = ("probability_min", "probability_mean", "probability_max")
 
@@ -42,6 +50,7 @@ def by_count(results: xr.Dataset, *, exact: xr.Dataset | None = None, ax: Axes |
     InputError
         If the exact results have other numbers in contact.
     """
+    check_dataset(results, "results")
     low, mean, high = (100 * over(results, name, ("count",), WAY_OUT).values for name in NEEDED)
     counts = results["count"].values.tolist()
     place = np.arange(len(counts), dtype=np.float64)
@@ -76,15 +85,14 @@ def by_count(results: xr.Dataset, *, exact: xr.Dataset | None = None, ax: Axes |
         ax.annotate("?", (x, 0.02), xycoords=("data", "axes fraction"), ha="center", va="bottom")
     ax.set_xticks(place, [_tick(results, int(count)) for count in counts])
     ax.set_xlim(-0.6, len(counts) - 0.4)
-    # Room for the legend above 100 %, where no data can be.
-    ax.set_ylim(-4, 128)
-    ax.set_yticks(range(0, 101, 20))
+    top = percent_top(high, mean if reach is None else mean + reach[1], *(others or []))
+    ax.set_ylim(-top / 26, top)
     ax.grid(axis="y", linewidth=0.4, alpha=0.5)
     ax.set_xlabel(
         "oscillators in contact (patterns)" if "in_contact" in results.coords else "oscillators in contact"
     )
     ax.set_ylabel(wrapped(ax, axis_label(results.get("probability", results[NEEDED[1]]), "%"), upright=True))
-    ax.legend(loc="upper center", ncols=2, fontsize="small", frameon=False)
+    legend_below(ax, width=1.7)
     return ax
 
 

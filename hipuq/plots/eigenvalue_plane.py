@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from hipuq.cea import damping_ratio
 from hipuq.errors import InputError
 from hipuq.plots.friction_sweep import cluster
+from hipuq.plots.grouping import ranges
 from hipuq.plots.style import BORDER, GREY, SHADES, SKY, STABLE, UNSTABLE, axis_label, new_axes
 from hipuq.plots.tracking import growth_threshold, sorted_sweep
 
@@ -192,7 +193,7 @@ def label_modes(ax: Axes, numbers: NDArray[Any], x: Array, y: Array, *, beside: 
         else:
             groups.append([i])
     for group in groups:
-        text = _ranges([int(numbers[i]) for i in group])
+        text = ranges([int(numbers[i]) for i in group])
         centre = (float(np.mean(x[group])), float(np.mean(y[group])))
         style: dict[str, Any] = {"ha": "left", "va": "center"} if beside else {"ha": "center", "va": "bottom"}
         offset = (5, 0) if beside else (0, 5)
@@ -200,21 +201,10 @@ def label_modes(ax: Axes, numbers: NDArray[Any], x: Array, y: Array, *, beside: 
         ax.annotate(text, centre, offset, textcoords="offset points", fontsize="small", zorder=1.8, **style)
 
 
-def _ranges(numbers: list[int]) -> str:
-    """Return ``"1-3, 5"`` for 1, 2, 3, 5."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
-
-
 def _frame(ax: Axes, inset: Axes, numbers: NDArray[np.int64]) -> None:
     """Say what an inset enlarges, and shade that in the axes."""
     inset.tick_params(labelsize="x-small")
     inset.ticklabel_format(useOffset=False)
     inset.locator_params(axis="x", nbins=5)
-    inset.set_title(f"modes {_ranges(numbers.tolist())} enlarged", fontsize="small")
+    inset.set_title(f"modes {ranges(numbers.tolist())} enlarged", fontsize="small")
     ax.axvspan(*inset.get_xlim(), color=SKY, alpha=0.3, linewidth=0, zorder=0.3)

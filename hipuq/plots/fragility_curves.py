@@ -17,7 +17,14 @@ from numpy.typing import NDArray
 from hipuq.errors import InputError, SchemaError
 from hipuq.plots.captions import legend_below, level, wrapped
 from hipuq.plots.measured import critical_marks
-from hipuq.plots.style import BORDER, LINES, axis_label, new_axes
+from hipuq.plots.style import (
+    BORDER,
+    LINES,
+    axis_label,
+    check_dataset,
+    new_axes,
+    plain,
+)
 
 NEEDED = ("probability", "probability_low", "probability_high")
 
@@ -61,9 +68,11 @@ def fragility(
     InputError
         If the limit is no probability between 0 and 1, a mapping is empty or has a `label` beside it.
     """
-    if limit is not None and not 0 < limit < 1:
-        raise InputError(f"limit is {limit}: it must be a probability above 0 and below 1")
+    if limit is not None and not (isinstance(limit, int | float) and 0 < limit < 1):
+        raise InputError(f"limit is {limit!r}: it must be a probability above 0 and below 1")
     curves: dict[str | None, xr.Dataset]
+    if not isinstance(results, Mapping):
+        check_dataset(results, "results")
     if isinstance(results, xr.Dataset):
         curves = {label: _over_friction(results)}
     else:
@@ -91,7 +100,7 @@ def _draw(ax: Axes, results: xr.Dataset, label: str | None, limit: float | None)
     probability, low, high = (100 * results[name].values for name in NEEDED)
     # Curves are the only lines on the Axes: each takes the next style.
     style = LINES[len(ax.lines) % len(LINES)]
-    name = label if label is not None else "probability"
+    name = plain(label) if label is not None else "probability"
     if "confidence" in results.attrs and (high > low).any():
         name += f", {level(results)}"
     # The edges have the style of the line, so that bands are told apart in grey.
@@ -106,7 +115,7 @@ def _draw(ax: Axes, results: xr.Dataset, label: str | None, limit: float | None)
     if limit is not None:
         ax.hlines(100 * limit, friction[0], friction[-1], zorder=0.5, **BORDER)
         ends, text = _reached(friction, probability, 100 * limit)
-        text = text if label is None else f"{label}: {text}"
+        text = text if label is None else f"{plain(label)}: {text}"
         dropped = {"color": colour, "linewidth": 1.2, "linestyle": ":"}
         ax.vlines(ends, 0, 100 * limit, zorder=0.6, label=text, **dropped)
 

@@ -115,7 +115,7 @@ def lock_in(
             _draw(ax, sweep, name, pair)
         axes[0, i].set_title(f"({chr(ord('a') + i)}) modes {' and '.join(str(mode) for mode in pair)}")
         axes[0, i].set_xlabel("")
-        _legend_below(axes[1, i])
+        _legend_below(axes[1, i], sweep)
     return axes
 
 
@@ -172,7 +172,7 @@ def dispersion(outcomes: xr.Dataset, *, axes: Sequence[Axes] | NDArray[Any] | No
     for ax in axes:
         _shade(ax, friction, np.isnan(sweep["unstable"].values).any(axis=1))
     handles, labels = axes[0].get_legend_handles_labels()
-    _legend_below(axes[-1], handles, labels)
+    _legend_below(axes[-1], sweep, handles, labels)
     return axes
 
 
@@ -205,7 +205,7 @@ def _over_friction(outcomes: xr.Dataset, name: str, modes: Sequence[int], ax: Ax
     check_modes(sweep, list(modes))
     ax = new_axes(ax)
     _draw(ax, sweep, name, modes)
-    _legend_below(ax)
+    _legend_below(ax, sweep)
     return ax
 
 
@@ -227,17 +227,20 @@ def _draw(ax: Axes, sweep: xr.Dataset, name: str, modes: Sequence[int]) -> None:
                 ax.plot(friction[few], points, markersize=4, markeredgewidth=0.8, **UNDECIDED)
     if name == "growth_rate":
         ax.axhline(growth_threshold(sweep), zorder=0.5, **BORDER)
-    for mode in modes:
-        _mark_lock_in(ax, sweep, mode)
+    marked = [_mark_lock_in(ax, sweep, mode) for mode in modes]
+    if not any(marked):
+        known = " where known" if unknown.any() else ""
+        text = f"never unstable{known}: no lock-in up to friction {friction[-1]:.4g}"
+        ax.fill_between([], [], [], alpha=0.0, label=text)
     ax.set_xlabel(axis_label(sweep["friction"]))
     ax.set_ylabel(axis_label(sweep[name]))
 
 
-def _mark_lock_in(ax: Axes, sweep: xr.Dataset, mode: int) -> None:
+def _mark_lock_in(ax: Axes, sweep: xr.Dataset, mode: int) -> bool:
     """Mark the friction at which a mode locks in, or becomes unstable despite damping, if it does."""
     low, high = bracket(sweep, mode)
     if np.isnan(high):
-        return
+        return False
     start, label = high, f"mode {mode}: unstable from {high:.4g}"
     if low < high:
         before = sweep["growth_rate"].sel(mode=mode).values[sweep["friction"].values == low]
@@ -245,13 +248,17 @@ def _mark_lock_in(ax: Axes, sweep: xr.Dataset, mode: int) -> None:
         digits = max(4, math.ceil(-math.log10(high - low) - 1e-6))
         start, label = low, f"mode {mode}: {what} between {low:.{digits}f} and {high:.{digits}f}"
     ax.axvspan(start, high, facecolor="none", edgecolor=BLACK, linewidth=0.8, zorder=0.6, label=label)
+    return True
 
 
-def _legend_below(ax: Axes, *entries: Any) -> None:
-    """Put the legend under the label of the x axis, where it hides nothing."""
-    ax.legend(
-        *entries, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2, frameon=False, fontsize="small"
-    )
+def _legend_below(ax: Axes, sweep: xr.Dataset, *entries: Any) -> None:
+    """Put the legend under the label of the x axis, where it hides nothing.
+
+    Its title says where modes have their numbers: elsewhere mode n is the n-th by frequency.
+    """
+    where = f"modes numbered by frequency at friction {float(sweep['reference_friction']):.4g}"
+    style: dict[str, Any] = {"frameon": False, "fontsize": "small", "title_fontsize": "small"}
+    ax.legend(*entries, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2, title=where, **style)
 
 
 def _shade(ax: Axes, friction: NDArray[np.float64], where: NDArray[np.bool_]) -> None:

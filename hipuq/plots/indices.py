@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.patches import Rectangle
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from hipuq.errors import InputError, check_name
@@ -127,7 +128,8 @@ def second_order(results: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     results : Dataset
         Results of the method ``"sobol"`` or ``"chaos"`` with ``S2(parameter, parameter_2)`` [1], and
         if there are any its limits. Each pair is shown once, as is its interval where it has one and
-        there is room; an undefined one is grey, or says so where there is room.
+        there is room; a pair whose interval holds 0 is hatched. An undefined one is grey, or says so where
+        there is room.
     ax : Axes, optional
         Where to draw; by default a new figure, larger the more parameters there are.
 
@@ -156,8 +158,10 @@ def second_order(results: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     known = pairs & np.isfinite(values)
     top = float(values[known].max()) if known.any() else 0.0
     top = top if top > 0 else 1.0
-    limits = _intervals(results, room=72 * min(inches(ax)) / cells)
-    _cells(ax, values, pairs, limits, top)
+    limits = _intervals(results)
+    roomy = 72 * min(inches(ax)) / cells > ROOM_FOR_INTERVAL
+    none = known & (limits[0] <= 0) & (limits[1] >= 0) if limits else np.zeros_like(known)
+    _cells(ax, values, pairs, limits if roomy else [], none, top)
     below = "min" if (values[known] < 0).any() else "neither"
     bar = ax.figure.colorbar(
         ScalarMappable(Normalize(0.0, top), COLOURS), ax=ax, extend=below, fraction=0.06, aspect=30
@@ -173,9 +177,10 @@ def second_order(results: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ax.set_xlim(-0.52, cells - 0.48)
     ax.set_ylim(cells - 0.48, -0.52)
     why = table.attrs.get("undefined", "") if not known.sum() == pairs.sum() else ""
-    beneath = f"beneath: {level(results)}" if limits and known.any() else ""
+    beneath = f"beneath: {level(results)}" if limits and roomy and known.any() else ""
+    hatched = f"hatched: {level(results)} holds 0" if none.any() else ""
     undefined = f"{UNDEFINED}: {why}" if why else ""
-    put_title(ax, subject(table), distrust(results), beneath, undefined)
+    put_title(ax, subject(table), distrust(results), "; ".join(filter(None, [beneath, hatched])), undefined)
     return ax
 
 
@@ -210,17 +215,27 @@ def _say_undefined(ax: Axes, y: Array, size: float) -> None:
         ax.annotate(UNDEFINED, (0, height), (4, 0), fontsize=size, **style)
 
 
-def _intervals(results: xr.Dataset, room: float) -> list[Array]:
-    """Return the limits of the second-order indices if there are any and a cell [pt] has room for them."""
+def _intervals(results: xr.Dataset) -> list[Array]:
+    """Return the limits of the second-order indices if there are any."""
     names = [f"S2_{end}" for end in ("low", "high")]
-    if room < ROOM_FOR_INTERVAL or not all(name in results for name in names):
+    if not all(name in results for name in names):
         return []
     dims = ("parameter", "parameter_2")
     return [over(results, name, dims, WAY_OUT).values[1:, :-1] for name in names]
 
 
-def _cells(ax: Axes, values: Array, pairs: NDArray[np.bool_], limits: list[Array], top: float) -> None:
-    """Draw a cell for each pair with its number, and its interval beneath; `top` has the darkest."""
+def _cells(
+    ax: Axes,
+    values: Array,
+    pairs: NDArray[np.bool_],
+    limits: list[Array],
+    none: NDArray[np.bool_],
+    top: float,
+) -> None:
+    """Draw a cell for each pair with its number, and its interval beneath; `top` has the darkest.
+
+    Cells of `none` are hatched.
+    """
     room = 72 * min(inches(ax)) / len(values)
     roomy = room > ROOM_FOR_INTERVAL
     size = min(9.0, room / 6.5) if roomy else min(8.0, 0.34 * room)
@@ -233,15 +248,18 @@ def _cells(ax: Axes, values: Array, pairs: NDArray[np.bool_], limits: list[Array
             low, high = (_fixed(end[i, j], decimals) for end in limits)
             text += f"\n{low} to\n{high}"
         lightness = float(np.clip(value / top, 0.0, 1.0)) if known else 0.0
-        fill: dict[str, Any] = {"facecolor": COLOURS(lightness)}
+        fill: dict[str, Any] = {"facecolor": COLOURS(lightness), "edgecolor": GREY}
+        if none[i, j]:
+            line = ("white", 0.7) if lightness > 0.35 else (GREY, 0.6)
+            fill |= {"hatch": "///" if roomy else "//////", "edgecolor": line}
         if not known:
-            fill = {"facecolor": (GREY, 0.25), "hatch": "" if roomy else "xx"}
-        ax.add_patch(
-            Rectangle((j - 0.5, i - 0.5), 1, 1, edgecolor=GREY, linewidth=0.5, clip_on=False, **fill)
-        )
-        ax.text(
-            j, i, text, ha="center", va="center", fontsize=size, color="white" if lightness > 0.6 else BLACK
-        )
+            fill = {"facecolor": (GREY, 0.25), "edgecolor": GREY, "hatch": "" if roomy else "xx"}
+        ax.add_patch(Rectangle((j - 0.5, i - 0.5), 1, 1, linewidth=0.5, clip_on=False, **fill))
+        colour, behind = ("white", COLOURS(lightness)) if lightness > 0.6 else (BLACK, "white")
+        style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": size, "color": colour}
+        shown = ax.text(j, i, text, **style)
+        if none[i, j]:
+            shown.set_path_effects([withStroke(linewidth=2.5, foreground=behind)])
 
 
 def _fixed(value: float, decimals: int) -> str:

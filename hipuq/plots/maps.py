@@ -17,7 +17,17 @@ from numpy.typing import NDArray
 
 from hipuq.errors import InputError, SchemaError, check_name
 from hipuq.plots.captions import legend_below, over, put_title, selected, wrapped
-from hipuq.plots.style import BLACK, SHADES, UNKNOWN, VERMILLION, axis_label, new_axes, scaled, shades_of
+from hipuq.plots.style import (
+    BLACK,
+    SHADES,
+    UNKNOWN,
+    VERMILLION,
+    axis_label,
+    check_dataset,
+    new_axes,
+    scaled,
+    shades_of,
+)
 from hipuq.plots.tracking import check_constant, growth_threshold
 
 Array = NDArray[np.float64]
@@ -81,8 +91,9 @@ def stability_map(data: xr.Dataset, x: str, y: str, *, of: str | None = None, ax
     Returns
     -------
     Axes
-        With the contour of a probability of 50 %, or the border of stability where it is crossed. What is
-        unknown is grey and hatched.
+        A cell reaches halfway to its neighbours, and ends at the outermost values. With the contour of a
+        probability of 50 %, or the border of stability where it is crossed. What is unknown is grey and
+        hatched.
 
     Raises
     ------
@@ -94,6 +105,7 @@ def stability_map(data: xr.Dataset, x: str, y: str, *, of: str | None = None, ax
         If a parameter has a single value, another one differs between samples, or `of` is given for results
         of something else.
     """
+    check_dataset(data, "data")
     if of is not None:
         check_name("of", of, QUANTITIES)
     if x == y:
@@ -230,9 +242,8 @@ def _colours(ax: Axes, grid: Grid) -> list[Any]:
 
 
 def _edges(values: Array) -> Array:
-    """Return the ends of cells about ascending values: halfway to the neighbours."""
-    middle = (values[1:] + values[:-1]) / 2
-    return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
+    """Return the ends of cells about ascending values: halfway to neighbours, none beyond the outermost."""
+    return np.concatenate([values[:1], (values[1:] + values[:-1]) / 2, values[-1:]])
 
 
 def _runs(grid: Grid, where: NDArray[np.bool_]) -> list[Array]:

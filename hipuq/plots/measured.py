@@ -14,7 +14,11 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from hipuq.errors import SchemaError
-from hipuq.plots.style import BLACK, GREY
+from hipuq.plots.style import (
+    BLACK,
+    GREY,
+    check_dataset,
+)
 
 Array = NDArray[np.float64]
 
@@ -37,7 +41,7 @@ class Published(NamedTuple):
     high: Array
 
 
-def published(literature: xr.Dataset, name: str) -> Published:
+def published(literature: xr.Dataset, name: str, quantity: str) -> Published:
     """Return published figures, those without any number left out.
 
     Parameters
@@ -46,6 +50,8 @@ def published(literature: xr.Dataset, name: str) -> Published:
         ``value``, ``low`` and ``high`` over ``source``, NaN where not given.
     name : str
         The argument that it was given as, for the error.
+    quantity : str
+        What the figures have to be of, as `hipuq.literature` knows it.
 
     Returns
     -------
@@ -57,6 +63,12 @@ def published(literature: xr.Dataset, name: str) -> Published:
     SchemaError
         If it is no such Dataset, or holds no number.
     """
+    check_dataset(literature, name)
+    of = literature.attrs.get("quantity", quantity)
+    if of != quantity:
+        raise SchemaError(
+            f"{name} is of {of!r}: it must be of {quantity!r}, as hipuq.literature({quantity!r})"
+        )
     for key in ("value", "low", "high", "source"):
         if key not in literature.variables or literature[key].dims != ("source",):
             raise SchemaError(f"{name} needs {key!r} over (source): as from hipuq.literature")
@@ -85,7 +97,7 @@ def incidence_band(ax: Axes, literature: xr.Dataset) -> tuple[float, float]:
     low, high : float
         Its ends [%].
     """
-    found = published(literature, "literature")
+    found = published(literature, "literature", "incidence")
     low, high = 100 * float(found.low.min()), 100 * float(found.high.max())
     text = f"{low:.3g} %" if low == high else f"{low:.3g} to {high:.3g} %"
     style: dict[str, Any] = {"facecolor": (GREY, 0.12), "edgecolor": (GREY, 0.6), "hatch": HATCHES[0]}
@@ -94,7 +106,7 @@ def incidence_band(ax: Axes, literature: xr.Dataset) -> tuple[float, float]:
     return low, high
 
 
-def frequency_bands(ax: Axes, measured: xr.Dataset) -> None:
+def frequency_bands(ax: Axes, measured: xr.Dataset, top: float = 1.0) -> None:
     """Draw measured frequencies of squeak as vertical bands, one for each source.
 
     Parameters
@@ -103,14 +115,17 @@ def frequency_bands(ax: Axes, measured: xr.Dataset) -> None:
         Its x axis is in kHz.
     measured : Dataset
         As from ``hipuq.literature("squeak_frequency")`` [Hz].
+    top : float, default 1
+        Where they end by the height of the Axes.
     """
-    found = published(measured, "measured")
+    found = published(measured, "measured", "squeak_frequency")
     for i, (source, low, high) in enumerate(zip(found.sources, found.low, found.high, strict=True)):
         low, high = low / 1000, high / 1000
         style: dict[str, Any] = {"facecolor": (GREY, 0.08), "edgecolor": (GREY, 0.6)}
         text = f"squeak measured, {source}: {low:.3g} to {high:.3g} kHz"
         hatch = HATCHES[i % len(HATCHES)]
-        _span(ax, low, high, hatch=hatch, linewidth=0.8, zorder=0.3 + 0.01 * i, label=text, **style)
+        style |= {"hatch": hatch, "linewidth": 0.8, "zorder": 0.3 + 0.01 * i, "ymax": top}
+        _span(ax, low, high, label=text, **style)
 
 
 def critical_marks(ax: Axes, critical: xr.Dataset, start: float, end: float) -> None:
@@ -127,7 +142,7 @@ def critical_marks(ax: Axes, critical: xr.Dataset, start: float, end: float) -> 
     start, end : float
         Range of friction that is drawn.
     """
-    found = published(critical, "critical")
+    found = published(critical, "critical", "critical_friction")
     reach = NEAR * (end - start)
     inside = (found.value >= start - reach) & (found.value <= end + reach)
     across = ax.get_xaxis_transform()

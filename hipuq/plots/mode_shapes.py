@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from hipuq.errors import InputError, SchemaError
+from hipuq.plots.captions import put_title
 from hipuq.plots.style import BLACK, BLUE, GREY, VERMILLION, new_axes
 
 SOCKET = 1.05
@@ -26,7 +27,8 @@ def mode_shape(shapes: xr.Dataset, mode: int, *, ax: Axes | None = None, scale: 
     shapes : Dataset
         From ``mode_shapes`` of a ring: ``displacement_real`` over (mode, oscillator, axis),
         ``position`` over (oscillator, axis) in radii, ``frequency`` [Hz] and ``growth_rate`` [1/s]
-        over mode.
+        over mode. If there are any, single values ``friction`` and ``damping_ratio``, as variables or
+        attributes, are told in the title.
     mode : int
         Number of the mode.
     ax : Axes, optional
@@ -87,9 +89,22 @@ def mode_shape(shapes: xr.Dataset, mode: int, *, ax: Axes | None = None, scale: 
     ax.set_xlim(left, right)
     ax.set_ylim(bottom, top)
     frequency, growth = float(chosen["frequency"]), float(chosen["growth_rate"])
-    ax.set_title(f"mode {mode}: {frequency:.1f} Hz, growth rate {growth + 0.0:.3g} 1/s")
+    fate = " (growing)" if growth > 0 else " (decaying)" if growth < 0 else ""
+    put_title(
+        ax, f"mode {mode}: {frequency:.1f} Hz, growth rate {growth + 0.0:.3g} 1/s{fate}", _where(shapes)
+    )
     ax.set_xlabel("x [radii]")
     ax.set_ylabel("y [radii]")
     # Inside the ring, where nothing is drawn.
     ax.legend(loc="center", bbox_to_anchor=(0.5, 0.66), frameon=False, fontsize="small")
     return ax
+
+
+def _where(shapes: xr.Dataset) -> str:
+    """Return at which friction and damping the shapes are, as far as the Dataset tells."""
+    told = []
+    for name, factor, unit in (("friction", 1.0, ""), ("damping_ratio", 100.0, " %")):
+        value = np.asarray(shapes[name] if name in shapes.variables else shapes.attrs.get(name, np.nan))
+        if value.size == 1 and np.isfinite(value.item()):
+            told.append(f"{name.replace('_', ' ')} {factor * value.item():.4g}{unit}")
+    return ", ".join(told)

@@ -16,8 +16,16 @@ from numpy.typing import NDArray
 
 from hipuq.errors import InputError, SchemaError
 from hipuq.plots.captions import level
-from hipuq.plots.grouping import check_values, patterns
-from hipuq.plots.style import BLACK, BLUE, VERMILLION, axis_label, new_axes, new_panels
+from hipuq.plots.grouping import check_values, left_out, patterns
+from hipuq.plots.style import (
+    BLACK,
+    BLUE,
+    VERMILLION,
+    axis_label,
+    new_axes,
+    new_panels,
+    plain,
+)
 
 NEEDED = ("probability_min", "probability_mean", "probability_max")
 LAST = 8
@@ -50,7 +58,8 @@ def occurrence(
     ax : Axes, optional
         Where to draw; a new figure by default.
     modes : sequence of int, optional
-        Modes to show; the last eight by default. A growing mode takes the upper number of its pair,
+        Modes to show; the last eight by default, and the label of the x axis then says which are left
+        out. A growing mode takes the upper number of its pair,
         but which pairs coalesce depends on the pattern, so odd and even modes both occur.
     names : mapping, optional
         Mode number -> name that the source gives it, shown beneath.
@@ -71,7 +80,7 @@ def occurrence(
     ax = new_axes(ax)
     _draw(ax, chosen, count, names or {}, _mean_label(results), beside)
     ax.set_title(_title(results, count))
-    ax.set_xlabel(mode_label(chosen, names))
+    ax.set_xlabel(_label(results, chosen, names, [count], modes))
     ax.set_ylabel(_probability_label(results))
     # Room for the legend above 100 %, where no data can be.
     ax.set_ylim(-4, 120)
@@ -128,7 +137,7 @@ def occurrence_panels(
     for ax in axes.flat[len(counts) :]:
         ax.set_visible(False)
     parent = axes[0, 0].figure
-    parent.supxlabel(mode_label(chosen, names), fontsize="medium")
+    parent.supxlabel(_label(results, chosen, names, counts, modes), fontsize="medium")
     parent.supylabel(_probability_label(results), fontsize="medium")
     legend: dict[str, Any] = {}
     for ax in axes.flat[: len(counts)]:
@@ -243,7 +252,7 @@ def mode_tick(chosen: xr.Dataset | xr.DataArray, place: int, names: Mapping[int,
     """
     mode = int(chosen["mode"].values[place])
     label = str(chosen["pair"].values[place]) if "pair" in chosen.coords else str(mode)
-    return f"{label}\n({names[mode]})" if mode in names else label
+    return f"{label}\n({plain(names[mode])})" if mode in names else label
 
 
 def mode_label(chosen: xr.Dataset | xr.DataArray, names: Mapping[int, str] | None) -> str:
@@ -252,6 +261,22 @@ def mode_label(chosen: xr.Dataset | xr.DataArray, names: Mapping[int, str] | Non
         "pair of modes, by ascending frequency" if "pair" in chosen.coords else "mode, by ascending frequency"
     )
     return f"{label} (name in the paper)" if names else label
+
+
+def _label(
+    results: xr.Dataset,
+    chosen: xr.Dataset,
+    names: Mapping[int, str] | None,
+    counts: Sequence[int],
+    modes: Sequence[int] | None,
+) -> str:
+    """Return the label of the x axis; of modes that were not asked for it says which are left out."""
+    label = mode_label(chosen, names)
+    if modes is not None:
+        return label
+    most = results["probability_max"].transpose("mode", "count").sel(count=list(counts)).values
+    gone = left_out(results["mode"].values, ~(most == 0).all(axis=1), chosen["mode"].values)
+    return "\n".join(filter(None, [label, gone]))
 
 
 def _probability_label(results: xr.Dataset) -> str:

@@ -13,7 +13,15 @@ from hipuq import schema
 from hipuq.errors import SchemaError
 from hipuq.plots.captions import level
 from hipuq.plots.fragility_curves import finish
-from hipuq.plots.style import BLACK, GREY, LINES, VERMILLION, axis_label, new_axes
+from hipuq.plots.style import (
+    BLACK,
+    GREY,
+    LINES,
+    VERMILLION,
+    axis_label,
+    check_dataset,
+    new_axes,
+)
 
 LIMITS = ("friction_limit", "friction_limit_low", "friction_limit_high")
 
@@ -30,8 +38,9 @@ def onset_distribution(
     ----------
     outcomes : Dataset
         ``onset(sample)`` [1]: the least friction coefficient with an unstable mode, +inf for a
-        configuration that is never unstable and NaN where it is unknown. Samples of a stratified
-        design count by their coord ``weight``.
+        configuration that is never unstable and NaN where it is unknown. The drawing covers the range
+        of friction that was swept, its attribute ``range`` or that of `limits`; without one it ends at the
+        last onset. Samples of a stratified design count by their coord ``weight``.
     ax : Axes, optional
         Where to draw; a new figure by default.
     limits : Dataset, optional
@@ -49,6 +58,7 @@ def onset_distribution(
     SchemaError, UnknownNameError
         If there is no such outcome, an onset is -inf, or the limits are not of this kind.
     """
+    check_dataset(outcomes, "outcomes")
     values = schema.check_outcomes(outcomes, "onset")
     onset = values.values.astype(np.float64)
     if onset.ndim != 1:
@@ -59,7 +69,8 @@ def onset_distribution(
         )
     weight = _weights(outcomes)
     unknown, never = np.isnan(onset), np.isposinf(onset)
-    friction, below = _steps(onset, weight)
+    swept = _swept(values, limits)
+    friction, below = _steps(onset, weight, swept)
     known = float(weight[~unknown].sum())
     ax = new_axes(ax)
     if unknown.any():
@@ -74,7 +85,11 @@ def onset_distribution(
         ax.vlines(friction[-1], share[-1], 100, color=BLACK, linestyle=":", linewidth=2, label=text)
     if limits is not None:
         _draw_limits(ax, limits, friction[-1])
-    ax.set_xlabel(axis_label(values.assign_attrs(long_name="friction coefficient at the onset")))
+    label = axis_label(values.assign_attrs(long_name="friction coefficient at the onset"))
+    if swept is None and not np.isfinite(onset).any():
+        ax.set_xticks([])
+        label += ": none, and the range is not known"
+    ax.set_xlabel(label)
     weighted = " (weighted)" if np.ptp(weight) > 1e-12 * weight.max() else ""
     ax.set_ylabel(f"share of configurations{weighted} [%]")
     finish(ax)
@@ -90,8 +105,8 @@ def _draw_limits(ax: Axes, limits: xr.Dataset, end: float) -> None:
     found = (limits[name].values.astype(np.float64) for name in LIMITS)
     for i, (target, at, low, high) in enumerate(zip(limits["target"].values, *found, strict=True)):
         percent = f"{100 * float(target):.4g} %"
-        if np.isnan(at):
-            text = f"{percent}: exceeded from the start of the range, or unknown"
+        if np.isnan(at) or np.isneginf(at):
+            text = f"{percent}: {'not known' if np.isnan(at) else 'exceeded from the start of the range'}"
             ax.scatter([], [], facecolors="none", edgecolors="none", label=text)
             continue
         if np.isinf(at):
@@ -99,10 +114,10 @@ def _draw_limits(ax: Axes, limits: xr.Dataset, end: float) -> None:
             ax.scatter([], [], facecolors="none", edgecolors="none", label=text)
             continue
         text = f"{percent}: not exceeded up to friction {at:.4g}"
-        if low < high or np.isnan(low):
-            ends = "start" if np.isnan(low) else f"{low:.4g}", "end" if np.isinf(high) else f"{high:.4g}"
+        if low < high:
+            ends = "start" if np.isneginf(low) else f"{low:.4g}", "end" if np.isinf(high) else f"{high:.4g}"
             text += f" ({level(limits)}: {ends[0]} to {ends[1]})"
-        start, stop = np.nan_to_num(low, nan=first), min(high, max(end, last))
+        start, stop = max(low, first), min(high, max(end, last))
         line: dict[str, Any] = {"color": VERMILLION, "zorder": 3}
         ax.hlines(100 * target, start, stop, linewidth=2.0, **line)
         ax.vlines(at, 0, 100 * target, linewidth=1.0, linestyle=":", **line)
@@ -121,16 +136,26 @@ def _weights(outcomes: xr.Dataset) -> NDArray[np.float64]:
     return np.asarray(weight / weight.sum())
 
 
+def _swept(onset: xr.DataArray, limits: xr.Dataset | None) -> tuple[float, float] | None:
+    """Return the range of friction that was swept; None where nothing says so."""
+    attrs = onset.attrs
+    if "range" not in attrs and limits is not None and LIMITS[0] in limits:
+        attrs = limits[LIMITS[0]].attrs
+    if "range" not in attrs:
+        return None
+    lower, upper = map(float, attrs["range"])
+    return lower, upper
+
+
 def _steps(
-    onset: NDArray[np.float64], weight: NDArray[np.float64]
+    onset: NDArray[np.float64], weight: NDArray[np.float64], swept: tuple[float, float] | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return where the distribution function steps, and the weight at or below, from 0 to a flat end."""
+    """Return where the distribution function steps, and the weight at or below, over the range swept."""
     finite = np.isfinite(onset)
     at, place = np.unique(onset[finite], return_inverse=True)
     below = np.cumsum(np.bincount(place, weights=weight[finite], minlength=len(at)))
-    start = min(0.0, at[0]) if len(at) else 0.0
-    end = at[-1] if len(at) else 0.0
-    # Without any onset nothing says how far friction goes.
-    flat = end + (0.08 * (end - start) or 1.0)
+    # Without a range nothing is known beyond the last onset.
+    start, end = swept or (0.0, at[-1] if len(at) else 1.0)
+    start, end = min([start, *at[:1]]), max([end, *at[-1:]])
     last = below[-1] if len(at) else 0.0
-    return np.concatenate([[start], at, [flat]]), np.concatenate([[0.0], below, [last]])
+    return np.concatenate([[start], at, [end]]), np.concatenate([[0.0], below, [last]])

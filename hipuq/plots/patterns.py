@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 from hipuq.errors import SchemaError
 from hipuq.plots.captions import inches, legend_below, over, wrapped
 from hipuq.plots.grouping import WAY_OUT, by_number
-from hipuq.plots.style import GREY, SHADES, UNKNOWN, axis_label, new_axes, shades_of
+from hipuq.plots.style import (
+    GREY,
+    SHADES,
+    UNKNOWN,
+    axis_label,
+    check_dataset,
+    new_axes,
+    shades_of,
+)
 
 Array = NDArray[np.float64]
 
@@ -58,6 +66,7 @@ def pattern_map(results: xr.Dataset, *, counts: Sequence[int] | None = None, ax:
     InputError
         If there are no patterns of a number in contact.
     """
+    check_dataset(results, "results")
     probability = over(results, "probability", ("pattern",), WAY_OUT)
     if "contact" not in results.variables or set(results["contact"].dims) != {"pattern", "oscillator"}:
         raise SchemaError(f"the figure needs the coord 'contact' over (pattern, oscillator): {WAY_OUT}")

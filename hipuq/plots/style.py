@@ -18,6 +18,7 @@ from matplotlib.figure import Figure, FigureBase
 from numpy.typing import NDArray
 
 from hipuq import schema
+from hipuq.errors import SchemaError
 
 BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY = (
     "#0072B2",
@@ -68,6 +69,9 @@ SHADES = LinearSegmentedColormap.from_list(
 )
 """Colours of a continuous variable: lightness falls all along, from one that still differs from paper."""
 
+HALF = 50.0
+"""Probability [%] from which on an axis reaches to 100 %."""
+
 PERCENT = ("damping_ratio", "damping_1", "damping_2")
 """Parameters that are drawn in per cent."""
 
@@ -116,6 +120,24 @@ def new_panels(
     return np.asarray(figure.subplots(rows, columns, squeeze=False, **options), dtype=object)
 
 
+def plain(text: str) -> str:
+    """Return a text of the user's for a label, where a dollar sign must not begin mathematics."""
+    return text.replace("$", r"\$")
+
+
+def check_dataset(value: object, name: str) -> None:
+    """Raise a SchemaError unless a value is a Dataset.
+
+    Parameters
+    ----------
+    value : object
+    name : str
+        What it was given as.
+    """
+    if not isinstance(value, xr.Dataset):
+        raise SchemaError(f"{name} must be an xarray Dataset, not {type(value).__name__}")
+
+
 def axis_label(variable: xr.DataArray, units: str | None = None) -> str:
     """Return the label of an axis: long name and unit of a variable.
 
@@ -160,25 +182,43 @@ def scaled(variable: xr.DataArray) -> tuple[NDArray[np.float64], str]:
     return values, axis_label(variable)
 
 
+def percent_top(*values: NDArray[np.float64]) -> float:
+    """Return the upper end of an axis of probabilities [%]: a little above 100, or above what is small.
+
+    Parameters
+    ----------
+    *values : array
+        What is drawn [%]; NaN where unknown.
+
+    Returns
+    -------
+    float
+        Up to a half the axis ends above the largest, else small ones could not be told apart.
+    """
+    most = max((float(np.nanmax(own, initial=0.0)) for own in values), default=0.0)
+    return 104.0 if most > HALF or most == 0 else 1.1 * most
+
+
 def shades_of(probability: NDArray[np.float64], *, close: bool = False) -> Normalize:
-    """Return the scale of colours of probabilities [%]: 0 to 100, where all are small to a rounder number.
+    """Return the scale of colours of probabilities [%]: 0 to 100, or less where all of them are small.
 
     Parameters
     ----------
     probability : array
         [%]; NaN where unknown.
     close : bool, default False
-        Whether to take no more than the tens that hold them, to tell them apart.
+        Whether to take no more than the tens that hold them, to tell them apart; ten points at least, so
+        that scatter of the estimates does not look like a difference.
 
     Returns
     -------
     Normalize
     """
     most = float(np.nanmax(probability, initial=0.0))
-    if close and most > 10:
+    if close and most > 0:
         least, most = 10 * np.floor(np.nanmin(probability) / 10), 10 * np.ceil(most / 10)
-        return Normalize(float(min(least, most - 10)), float(most))
-    if most == 0 or most > 50:
+        return Normalize(float(max(min(least, most - 10), 0.0)), float(most))
+    if most == 0 or most > HALF:
         return Normalize(0.0, 100.0)
     power = 10.0 ** np.floor(np.log10(most))
     return Normalize(0.0, float(next(step * power for step in (1, 2, 3, 5, 7.5, 10) if most <= step * power)))

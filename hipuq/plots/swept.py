@@ -15,15 +15,43 @@ from hipuq.errors import InputError, SchemaError, check_name
 from hipuq.plots.captions import distrust, legend_below, level, put_title, selected, wrapped
 from hipuq.plots.measured import incidence_band
 from hipuq.plots.scales import label_decades
-from hipuq.plots.style import LINES, MARKERS, axis_label, new_axes, scaled
+from hipuq.plots.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    axis_label,
+    check_dataset,
+    new_axes,
+    percent_top,
+    plain,
+    scaled,
+)
 from hipuq.sweeping import swept
 
 Array = NDArray[np.float64]
 
 SCALES = ("linear", "log")
 
-WHOLE = 50.0
-"""Probability [%] from which the axis goes to 100 %."""
+CURVES: tuple[dict[str, Any], ...] = (
+    {"color": BLUE, "linestyle": "-", "linewidth": 1.4, "marker": "o"},
+    {"color": ORANGE, "linestyle": (0, (4, 1.5)), "linewidth": 2.6, "marker": "^"},
+    {"color": GREEN, "linestyle": "-.", "linewidth": 1.2, "marker": "s"},
+    {"color": PURPLE, "linestyle": (0, (1, 1)), "linewidth": 2.6, "marker": "D"},
+    {"color": VERMILLION, "linestyle": (0, (8, 2)), "linewidth": 1.2, "marker": "v"},
+    {"color": SKY, "linestyle": (0, (6, 1, 1, 1)), "linewidth": 2.6, "marker": "P"},
+)
+"""Styles of curves, taken in turn: thin, dark and open, or thick, light and filled."""
+
+MARKS: tuple[dict[str, Any], ...] = (
+    {"markersize": 4.5, "markerfacecolor": "white", "zorder": 2.2},
+    {"markersize": 7.0, "markeredgecolor": BLACK, "markeredgewidth": 0.6, "zorder": 2.1},
+)
+"""Markers by turns; open ones are smaller and lie above, so that both are seen where they meet."""
 
 
 @dataclass(frozen=True)
@@ -93,9 +121,13 @@ def probability_over(
         If the mapping is empty, or there is no such scale.
     """
     check_name("scale", scale, SCALES)
+    if not isinstance(results, xr.Dataset | Mapping):
+        raise SchemaError(f"results must be a Dataset, or a dict of them, not {type(results).__name__}")
     given = {"": results} if isinstance(results, xr.Dataset) else dict(results)
     if not given:
         raise InputError("results are empty: give at least one")
+    for label, part in given.items():
+        check_dataset(part, f"results {label!r}" if label else "results")
     curves = {label: _curve(part, dim) for label, part in given.items()}
     dims = sorted({curve.dim for curve in curves.values()})
     if len(dims) > 1:
@@ -104,8 +136,12 @@ def probability_over(
     ax = new_axes(ax)
     band = None if literature is None else incidence_band(ax, literature)
     bottom, top = _limits(ax, list(curves.values()), band, scale)
+    said = {curve.limits for curve in curves.values()}
+    shared = next(iter(said)) if len(said) == 1 and len(curves) > 1 else ""
     for label, curve in curves.items():
-        _draw(ax, curve, label, scale, bottom)
+        _draw(ax, curve, plain(str(label)), "" if shared else curve.limits, scale, bottom)
+    if shared:
+        ax.fill_between([], [], [], facecolor=(GREY, 0.2), edgecolor=GREY, label=f"bands: {shared}")
     if scale == "log":
         ax.set_yscale("log")
     ax.set_ylim(bottom, top)
@@ -173,18 +209,16 @@ def _limits(
         least = known[known > 0]
         bottom = 10.0 ** np.floor(np.log10(least.min() / 1.5)) if least.size else 1e-3
         return min(bottom, old[0]) if old else float(bottom), 130.0
-    most = float(np.nanmax(known, initial=0.0))
-    top = 104.0 if most > WHOLE or most == 0 else 1.1 * most
+    top = percent_top(known)
     top = max(top, old[1]) if old else top
     return -0.04 * top, top
 
 
-def _draw(ax: Axes, curve: Curve, label: str, scale: str, bottom: float) -> None:
-    """Draw one curve with its band, and mark what it cannot show."""
+def _draw(ax: Axes, curve: Curve, label: str, limits: str, scale: str, bottom: float) -> None:
+    """Draw one curve with its band, and mark what it cannot show; the legend has its label and limits."""
     # Curves are the only lines on the Axes: each takes the next style.
     rank = len(ax.lines)
-    style = LINES[rank % len(LINES)]
-    marker = MARKERS[rank % len(MARKERS)]
+    style = CURVES[rank % len(CURVES)] | MARKS[rank % len(MARKS)]
     colour = style["color"]
     x, values = curve.x, curve.probability
     if curve.limits:
@@ -193,9 +227,9 @@ def _draw(ax: Axes, curve: Curve, label: str, scale: str, bottom: float) -> None
         low = np.maximum(curve.low, bottom) if scale == "log" else curve.low
         ax.fill_between(x, low, curve.high, facecolor=(colour, 0.15), **edge)
     none = (values == 0) & (scale == "log")
-    text = ", ".join(filter(None, [label or "probability", curve.limits]))
+    text = ", ".join(filter(None, [label or "probability", limits]))
     shown = np.where(none, np.nan, values)
-    ax.plot(x, shown, label=text, marker=marker, markersize=5, markerfacecolor="white", **style)
+    ax.plot(x, shown, label=text, **style)
     if none.any():
         at = np.where(curve.high[none] > 0, curve.high[none], 1.3 * bottom)
         down: dict[str, Any] = {"marker": "$\\downarrow$", "color": colour, "s": 70, "zorder": 3}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import xarray as xr
 
 from hipuq import schema
@@ -29,6 +30,9 @@ def agreement(reading: Reading) -> Block:
     """
     rows, agree = [], 0
     for sampled, other, one, two in pairs_of(reading.found):
+        if not all(np.isfinite(float(own[probability_name(own)])) for own in (one, two)):
+            # What is not known agrees with everything: no evidence.
+            continue
         first, second = (cell(own, probability_name(own)) for own in (one, two))
         yes = _meet(one, two)
         agree += yes
@@ -48,7 +52,8 @@ def agreement(reading: Reading) -> Block:
         "overlap. Of 95 % "
         "intervals, one in twenty misses even where all is right"
     )
-    columns = ["damping", "friction sampled", "P(squeak)", "friction integrated", "P(squeak)", ""]
+    columns = ["damping", "friction sampled", "P(squeak), sampled", "friction integrated"]
+    columns += ["P(squeak), integrated", "agreement"]
     if not any(row[0] for row in rows):
         columns, rows = columns[1:], [row[1:] for row in rows]
     table = Table("Friction sampled and integrated, of the same model and inputs", columns, rows)

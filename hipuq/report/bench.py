@@ -12,7 +12,8 @@ from hipuq.distributions import Distribution, from_description
 from hipuq.errors import HipuqError
 from hipuq.report.block import Block
 from hipuq.report.damping import at_damping
-from hipuq.report.friction import group, onset_quantiles
+from hipuq.report.frequency import between
+from hipuq.report.friction import censored, group, onset_quantiles, range_of
 from hipuq.report.parts import frequencies
 from hipuq.report.reading import FRICTION, Reading, probability_name
 from hipuq.report.summary import LITERATURE, integrated
@@ -62,7 +63,9 @@ def bench(reading: Reading) -> Block:
     if not tables:
         return Block("bench", TITLE)
     lines = [HONEST, *lines] if reading.results is not None else lines
-    return Block("bench", TITLE, lines, text=tables, brief=[line for line in lines[1:2] if line])
+    incidence = published(reading, "incidence")
+    brief = [] if incidence is None else _incidence(reading, incidence, brief=True)
+    return Block("bench", TITLE, lines, text=tables, brief=brief)
 
 
 def _table(there: xr.Dataset, quantity: str) -> Table:
@@ -99,7 +102,7 @@ def _ends(there: xr.Dataset) -> tuple[float, float]:
     return float(np.nanmin(values)), float(np.nanmax(values))
 
 
-def _incidence(reading: Reading, there: xr.Dataset) -> list[str]:
+def _incidence(reading: Reading, there: xr.Dataset, *, brief: bool = False) -> list[str]:
     if reading.results is None:
         return []
     results = reading.results
@@ -107,17 +110,28 @@ def _incidence(reading: Reading, there: xr.Dataset) -> list[str]:
     low, high = _ends(there)
     if np.isnan(value):
         return []
-    where = f" {words}" if (words := at_damping(results)) else ""
+    where = f" {words}" if (words := at_damping(results)) and not brief else ""
     told = percent(value) if value >= 0.0005 or value == 0 else f"{number(100 * value, 2)} %"
     text = f"P(squeak) is {told}{where}, the incidence reported {percent(low)} to {percent(high)}: "
     if value > high:
         return [text + f"the model says {factor(value / high)} to {factor(value / low)} times as much"]
+    if value == 0:
+        return [f"{text}{_at_most(results, low)}"]
     if value < low:
-        times = (
-            "nothing of it" if value == 0 else f"{factor(low / value)} to {factor(high / value)} times less"
-        )
-        return [text + f"the model says {times}"]
+        return [text + f"the model says {factor(low / value)} to {factor(high / value)} times less"]
     return [text + "the model lies within that range, which does not make it right"]
+
+
+def _at_most(results: xr.Dataset, low: float) -> str:
+    """Return what a probability of 0 leaves possible, beside the lowest incidence reported."""
+    most = float(results[f"{probability_name(results)}_high"])
+    if most <= 0:
+        return "the model says that none is unstable"
+    told = percent(most) if most >= 0.0005 else f"{number(100 * most, 2)} %"
+    text = f"the model says at most {told}"
+    if most >= low:
+        return f"{text}, which does not tell it from what is reported"
+    return f"{text}, that is at least {factor(low / most)} times less"
 
 
 def _critical(reading: Reading, there: xr.Dataset) -> list[str]:
@@ -126,19 +140,8 @@ def _critical(reading: Reading, there: xr.Dataset) -> list[str]:
     lines = []
     found = group(reading, "onsets")
     quantiles = None if found is None else onset_quantiles(found[1])
-    if quantiles is not None:
-        median = float(quantiles[0][1])
-        if np.isfinite(median):
-            place = "below" if median < low else "above" if median > high else "within"
-            times = f" by a factor of {factor(low / median)}" if 0 < median < low else ""
-            lines.append(
-                f"{sentence(measured)}; the median onset of the model, {number(median)}, lies {place} "
-                f"that{times}"
-            )
-        else:
-            lines.append(
-                f"{sentence(measured)}; half of the configurations of the model have no onset at all"
-            )
+    if found is not None and quantiles is not None:
+        lines.append(f"{sentence(measured)}; {_median(float(quantiles[0][1]), found[1], low, high)}")
     friction = friction_of(reading.results)
     if friction is not None and friction.cdf is not None:
         beyond = 1.0 - float(friction.cdf(np.array([low]))[0])
@@ -154,6 +157,24 @@ def _critical(reading: Reading, there: xr.Dataset) -> list[str]:
                 f"probability of {percent(beyond)}"
             )
     return lines
+
+
+def _median(median: float, onsets: xr.Dataset, low: float, high: float) -> str:
+    """Return where the median onset lies beside the lowest and highest friction at which squeak set in."""
+    lower, upper = range_of(onsets)
+    if censored(median, onsets):
+        # Beyond the range nothing was looked at: there is nothing to hold against the bench.
+        if np.isfinite(median):
+            return f"the median onset of the model is at or below {lower:g}, where the range begins"
+        end = f" up to {upper:g}, where the range ends" if np.isfinite(upper) else " within the range"
+        return f"half of the configurations of the model have no onset{end}"
+    text = f"the median onset of the model, {number(median)}, lies"
+    if low <= median <= high:
+        return f"{text} within that"
+    ratios = sorted((median / low, median / high) if median > high else (low / median, high / median))
+    ends = [factor(one) for one in ratios]
+    times = ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
+    return f"{text} {'above' if median > high else 'below'} that by a factor of {times}"
 
 
 def _support(friction: Distribution) -> str:
@@ -173,12 +194,31 @@ def _frequency(reading: Reading, there: xr.Dataset) -> list[str]:
     if not np.isfinite(low).any():
         return []
     lowest, highest = float(np.nanmin(low)), float(np.nanmax(high))
-    ends = _ends(there)
-    apart = highest < ends[0] or lowest > ends[1]
-    measured = f"{number(ends[0] / 1000)} to {number(ends[1] / 1000)} kHz"
-    predicted = f"Unstable modes vibrate at {lowest / 1000:.3g} to {highest / 1000:.3g} kHz"
-    meet = "they do not meet" if apart else "they overlap"
-    return [f"{predicted}, squeak on the bench at {measured}: {meet}"]
+    told = []
+    for i, source in enumerate(there["source"].values):
+        first, last = (float(there[key][i]) for key in ("low", "high"))
+        if np.isfinite([first, last]).all() and last > first:
+            told.append(f"{_place(lowest, highest, first, last)} ({source})")
+    if not told:
+        return []
+    return [
+        f"Unstable modes vibrate at {between(lowest, highest)}: beside squeak on the bench that lies "
+        f"{', '.join(told)}"
+    ]
+
+
+def _place(lowest: float, highest: float, first: float, last: float) -> str:
+    """Return where a range of frequencies [Hz] lies in a measured one."""
+    measured = f"{number(first / 1000)} to {number(last / 1000)} kHz"
+    if highest < first or lowest > last:
+        return f"{'below' if highest < first else 'above'} {measured}"
+    if lowest < first or highest > last:
+        return f"partly within {measured}"
+    parts = {"lowest": (highest - first) / (last - first), "highest": (last - lowest) / (last - first)}
+    end = min(parts, key=lambda key: parts[key])
+    if parts[end] > 0.5:
+        return f"within {measured}"
+    return f"in the {end} {max(1, round(100 * parts[end]))} % of the measured {measured}"
 
 
 def friction_of(results: xr.Dataset | None) -> Distribution | None:

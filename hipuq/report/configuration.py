@@ -6,8 +6,9 @@ import xarray as xr
 from rich.console import Console
 from rich.markup import escape
 
+from hipuq.report.printing import printed
 from hipuq.report.table import Table
-from hipuq.report.text import printed, screen_for
+from hipuq.report.text import screen_for
 
 DIGITS = 13
 """Significant digits of a friction coefficient."""
@@ -31,7 +32,7 @@ def show_onset(found: xr.Dataset, console: Console | None = None) -> None:
         screen.print("unstable throughout" if always else "stable throughout")
     for table in (_intervals(found), _boundaries(found), _by_mode(found)):
         if table.rows:
-            screen.print(printed(table))
+            screen.print(printed(table, screen.width))
     if float(found["unknown"]) > 0:
         screen.print(f"not decided: friction of length {float(found['unknown']):.3g} in all")
 

@@ -30,7 +30,7 @@ def damping_words(results: xr.Dataset) -> str:
     Parameters
     ----------
     results : Dataset
-        Results of any method.
+        Results of any method, or what is computed at nominal values: samples, or the shapes of modes.
 
     Returns
     -------
@@ -41,8 +41,9 @@ def damping_words(results: xr.Dataset) -> str:
     nominal, inputs = nominal_of(results), _inputs(results)
     told, known = [], False
     for name in (*RATIOS, *RAYLEIGH):
-        if name in results.coords:
-            values = np.atleast_1d(results[name].values)
+        if name in results.variables or name in results.attrs:
+            found = results[name].values if name in results.variables else results.attrs[name]
+            values = np.atleast_1d(np.asarray(found, np.float64))
             told.append(_said(name, [float(values.min()), float(values.max())]))
         elif name in inputs:
             told.append(f"uncertain {_called(name)}, {_drawn(inputs[name])}")

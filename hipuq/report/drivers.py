@@ -56,9 +56,7 @@ def drivers(reading: Reading) -> Block:
     words = in_words(results)
     where = f", {text}" if (text := at_damping(results)) else ""
     method = str(results.attrs["method"])
-    lines = (
-        [words] if words else ["The indices are undefined, or those of a surrogate that is not to be trusted"]
-    )
+    lines = [words or _why(results)]
     lines.append(f"From the analysis {name!r} of {of}, by {method}{where}: {results.attrs['model']}")
     if integrated(results):
         lines.append(
@@ -71,4 +69,15 @@ def drivers(reading: Reading) -> Block:
     lines += surrogate.distrust(results)
     if text := note(results):
         lines.append(text)
-    return Block("drivers", TITLE, lines, tables(results)[:1], brief=lines[:2])
+    # The method and the model are told with the headline, or in full.
+    brief = [lines[0], f"From the analysis {name!r} of {of}{where}"]
+    return Block("drivers", TITLE, lines, tables(results)[:1], brief=brief)
+
+
+def _why(results: xr.Dataset) -> str:
+    """Return why there are no words for indices."""
+    if surrogate.distrust(results):
+        return "The indices are those of a surrogate that is not to be trusted"
+    reasons = (str(results[key].attrs.get("undefined", "")) for key in ("S1", "ST"))
+    reason = next(filter(None, reasons), "")
+    return f"The indices are undefined: {reason}" if reason else "The indices are undefined"

@@ -21,6 +21,13 @@ BY_MODE = {"count", "mode"}
 """Dims of what is summed up by number in contact and mode."""
 
 
+NUMBERED = (
+    "Modes are followed through the sweep and keep their number at its start; elsewhere mode n is the n-th "
+    "by frequency of each sample."
+)
+"""How modes are named in figures of a sweep over friction."""
+
+
 def pictures(tree: xr.DataTree) -> Iterator[Picture]:
     """Give the figures of a results tree, one after the other.
 
@@ -116,7 +123,8 @@ def _mode_shapes(analysis: str, shapes: xr.Dataset, reading: Reading) -> Picture
         plots.mode_shape(shapes, mode, ax=ax)
     called = [f"mode {mode} is published as mode {names[str(mode)]}" for mode in modes if str(mode) in names]
     friction = reading.report["shape_friction"]
-    caption = f"Mode shapes over the undeformed ring, all oscillators in contact, friction {friction}."
+    where = f", {words}" if (words := at_damping(shapes)) else ""
+    caption = f"Mode shapes over the undeformed ring, all oscillators in contact, friction {friction}{where}."
     return Picture(
         analysis, "mode_shapes", caption + (f" Here {'; '.join(called)}." if called else ""), figure
     )
@@ -130,25 +138,30 @@ def _sweep(analysis: str, sweep: xr.Dataset, chosen: list[list[int]]) -> Iterato
         figure = Figure(figsize=(5.5 * len(pairs), 7), layout="constrained")
         plots.lock_in(sweep, pairs, figure=figure)
         yield Picture(
-            analysis, "lock_in", f"Mode coupling: frequency and growth rate {at}, with the lock-in.", figure
+            analysis,
+            "lock_in",
+            f"Mode coupling: frequency and growth rate {at}, with the lock-in. {NUMBERED}",
+            figure,
         )
     figure = Figure(figsize=(10, 10), layout="constrained")
     plots.dispersion(sweep, axes=figure.subplots(3, 1, sharex=True))
     yield Picture(
         analysis,
         "dispersion",
-        f"Dispersion diagram: imaginary and real part of all eigenvalues {at}.",
+        f"Dispersion diagram: imaginary and real part of all eigenvalues {at}. {NUMBERED}",
         figure,
     )
     figure = Figure(figsize=(8, 6), layout="constrained")
     plots.root_locus(sweep, ax=figure.subplots())
-    yield Picture(analysis, "root_locus", f"Root locus: growth rate against frequency {at}.", figure)
+    yield Picture(
+        analysis, "root_locus", f"Root locus: growth rate against frequency {at}. {NUMBERED}", figure
+    )
     figure = Figure(figsize=(8, 6), layout="constrained")
     plots.damping_over_frequency(sweep, ax=figure.subplots())
     yield Picture(
         analysis,
         "damping_ratio",
-        "Damping ratio of each mode against its frequency at the largest friction of the sweep; a "
-        "negative one belongs to a growing mode.",
+        f"Damping ratio of each mode against its frequency at nominal values{where}, at the largest friction "
+        f"of the sweep; a negative one belongs to a growing mode. {NUMBERED}",
         figure,
     )

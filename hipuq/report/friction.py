@@ -9,14 +9,14 @@ from hipuq import schema
 from hipuq.report.block import Block
 from hipuq.report.parts import origin
 from hipuq.report.reading import FRICTION, Reading
-from hipuq.report.table import Table, number, sentence, share
+from hipuq.report.table import Table, number, plain, sentence, significant
 
 FRAGILITY_TITLE = "Fragility: P(squeak) at each friction, and the onsets"
 
 LIMIT_TITLE = "Friction limit that keeps P(squeak) below a target"
 
-NONE, WHOLE = "none", "the whole range"
-"""What stands for a target that is exceeded from the start of the range, and for one that never is."""
+NONE, WHOLE, UNKNOWN = "none", "the whole range", "not known"
+"""What stands for a target that is exceeded from the start of the range, one that never is, and no answer."""
 
 WAY_OUT = "an analysis with integrate_friction = true, or one swept over friction,"
 
@@ -58,7 +58,7 @@ def fragility_block(reading: Reading) -> Block:
     """
     found, onsets = curve(reading), group(reading, "onsets")
     if found is None and onsets is None:
-        line = f"The fragility curve and the onsets need {WAY_OUT} which this study has not"
+        line = f"The fragility curve and the onsets need {WAY_OUT} of whose outcomes these results hold none"
         return Block("fragility", FRAGILITY_TITLE, [line] if reading.results is not None else [])
     analysis = found[0] if found is not None else onsets[0] if onsets is not None else ""
     lines = []
@@ -76,7 +76,7 @@ def _at_ends(fragility: xr.Dataset) -> list[str]:
     values, friction = fragility["probability"].values, fragility["friction"].values
     if not np.isfinite(values).any() or len(values) < 2:
         return ["The probability is not known at any friction"] if not np.isfinite(values).any() else []
-    told = [f"{share(float(values[i]))} at a friction of {friction[i]:.4g}" for i in (0, -1)]
+    told = [f"{plain(float(values[i]))} at a friction of {friction[i]:.4g}" for i in (0, -1)]
     half = np.flatnonzero(values >= 0.5)
     text = f"P(squeak) is {told[0]} and {told[1]}"
     if half.size and half[0] > 0:
@@ -92,17 +92,51 @@ def onset_words(onsets: xr.Dataset) -> list[str]:
     quantiles, never, unknown = found
     lines = []
     if np.isfinite(quantiles).any():
-        low, median, high = (number(one) if np.isfinite(one) else "beyond the range" for one in quantiles)
+        low, median, high = (placed(float(one), onsets) for one in quantiles)
         lines.append(
-            f"The onset, the friction from which on a configuration is unstable, has the median {median}, "
-            "with "
-            f"5 % below {low} and 95 % below {high}"
+            "The onset is the friction from which on a configuration is unstable: its 5 % quantile is "
+            f"{low}, its median {median}, its 95 % quantile {high}"
+        )
+    lower, upper = range_of(onsets)
+    start = float(_weight(onsets)[onsets["onset"].values <= lower].sum())
+    if start:
+        lines.append(
+            f"{100 * start:.3g} % of the configurations are unstable from the start of the range, {lower:g}: "
+            "their onset is there or lower"
         )
     if never:
-        lines.append(f"{100 * never:.3g} % of the configurations are stable over the whole range of friction")
+        till = f" up to a friction of {upper:g}, where it ends" if np.isfinite(upper) else ""
+        lines.append(f"{100 * never:.3g} % of the configurations are stable over the whole range{till}")
     if unknown:
         lines.append(f"The onset of {100 * unknown:.3g} % of the configurations is not known")
     return lines
+
+
+def range_of(onsets: xr.Dataset) -> tuple[float, float]:
+    """Return the range of friction in which onsets were looked for; infinite where it is not told."""
+    found = onsets["onset"].attrs.get("range")
+    return (-np.inf, np.inf) if found is None else (float(found[0]), float(found[1]))
+
+
+def censored(onset: float, onsets: xr.Dataset) -> bool:
+    """Say whether an onset is where the range begins, or beyond where it ends: it is then no onset."""
+    return not np.isfinite(onset) or onset <= range_of(onsets)[0]
+
+
+def placed(onset: float, onsets: xr.Dataset) -> str:
+    """Return an onset as text: at the start and beyond the end of the range it says so."""
+    lower, upper = range_of(onsets)
+    if not np.isfinite(onset):
+        return f"beyond {upper:g}, where the range ends" if np.isfinite(upper) else "beyond the range"
+    return f"at or below {lower:g}" if onset <= lower else number(onset)
+
+
+def _weight(onsets: xr.Dataset) -> np.ndarray:
+    """Return the weights of the samples; all together 1."""
+    weight = np.ones(onsets["onset"].shape)
+    if "weight" in onsets.coords:
+        weight = onsets["weight"].values.astype(np.float64)
+    return np.asarray(weight / weight.sum())
 
 
 def onset_quantiles(onsets: xr.Dataset) -> tuple[np.ndarray, float, float] | None:
@@ -111,13 +145,12 @@ def onset_quantiles(onsets: xr.Dataset) -> tuple[np.ndarray, float, float] | Non
     Returns
     -------
     quantiles : (3,) array
-        Infinite where the range of friction ends before.
+        Infinite where the range of friction ends before; see `censored`.
     never, unknown : float
         Shares of the weight.
     """
     onset = onsets["onset"].values.astype(np.float64)
-    weight = onsets["weight"].values if "weight" in onsets.coords else np.ones(onset.shape)
-    weight = weight / weight.sum()
+    weight = _weight(onsets)
     known = ~np.isnan(onset)
     if not known.any():
         return None
@@ -141,26 +174,23 @@ def limit_block(reading: Reading) -> Block:
     """
     found = group(reading, "friction_limit")
     if found is None:
-        line = f"The friction limits need {WAY_OUT} which this study has not"
+        line = f"The friction limits need {WAY_OUT} of whose outcomes these results hold none"
         return Block("limit", LIMIT_TITLE, [line] if reading.results is not None else [])
     analysis, limits = found
-    rows, said = [], []
+    rows, said = [], limit_words(reading, analysis, limits)
     for i, target in enumerate(limits["target"].values):
         value, low, high = (float(limits[f"friction_limit{end}"][i]) for end in ("", "_low", "_high"))
         row = [f"{100 * float(target):g} %", _limit(value)]
         if not schema.is_exact(limits):
             row.append(f"{_limit(low)} to {_limit(high)}" if _limit(low) != _limit(high) else _limit(low))
         rows.append(row)
-        if np.isfinite(value):
-            said.append(f"up to a friction of {value:.4g} at most {100 * float(target):g} %")
     level = f"{100 * float(limits.attrs.get('confidence', np.nan)):g} % interval"
     columns = ["target for P(squeak)", "friction limit", *([level] if not schema.is_exact(limits) else [])]
     ends = limits["friction_limit"].attrs.get("range")
     note = "" if ends is None else f"Friction was looked at from {float(ends[0]):g} to {float(ends[1]):g}. "
     note += f"{sentence(NONE)}: the target is exceeded from the start; {WHOLE}: it is kept to the end"
     lines = first = origin(reading, analysis, limits)
-    if said:
-        lines = [*first, sentence(f"{'; '.join(said)} of the configurations are unstable")]
+    lines = [*first, *said]
     brief_columns = ["target", *(row[0] for row in rows)]
     brief = Table(
         "", brief_columns, [[columns[k], *(row[k] for row in rows)] for k in range(1, len(columns))]
@@ -169,8 +199,56 @@ def limit_block(reading: Reading) -> Block:
     return Block("limit", LIMIT_TITLE, lines, [table], brief=[brief, *first])
 
 
+def limit_words(reading: Reading, analysis: str, limits: xr.Dataset) -> list[str]:
+    """Return in sentences up to which friction each target is kept to, as far as that can be promised.
+
+    Parameters
+    ----------
+    reading : Reading
+    analysis : str
+    limits : Dataset
+        As from `hipuq.friction_limit`. Of sampled ones the lower limit is told first: the estimate is
+        missed by half of all samples.
+    """
+    ends = limits["friction_limit"].attrs.get("range")
+    end = "" if ends is None else f", {float(ends[1]):g},"
+    exact = schema.is_exact(limits)
+    kept, lines = [], []
+    for i, target in enumerate(limits["target"].values):
+        share_ = f"{100 * float(target):g} %"
+        value, low = (float(limits[f"friction_limit{part}"][i]) for part in ("", "_low"))
+        if np.isnan(value):
+            lines.append(f"Whether a target of {share_} is kept at any friction is not known")
+        elif np.isneginf(value):
+            lines.append(f"A target of {share_} is exceeded from the start of the range")
+        elif np.isneginf(low):
+            onsets = reading.found[analysis].get("onsets")
+            count = "" if onsets is None else f" ({onsets.sizes['sample']:,})"
+            lines.append(
+                f"Too few configurations{count} for a target of {share_}: no friction can be promised "
+                f"(estimate {_limit(value)})"
+            )
+        else:
+            up = f"the end of the range{end}" if np.isinf(low) else f"a friction of {_limit(low)}"
+            estimate = "" if exact or np.isinf(low) else f" (estimate {_limit(value)})"
+            kept.append(f"up to {up} at most {share_}{estimate}")
+    if kept:
+        level = 100 * float(limits.attrs.get("confidence", np.nan))
+        sure = "" if exact else f"With {level:g} % confidence (two-sided interval): "
+        lines.insert(0, sentence(f"{sure}{'; '.join(kept)} of the configurations are unstable"))
+    return lines
+
+
+def rounded_down(value: float, digits: int = 4) -> float:
+    """Return a number with so many digits and never above it, but for what is rounding already."""
+    if not np.isfinite(value) or value <= 0:
+        return value
+    scale = 10.0 ** (digits - 1 - int(np.floor(np.log10(value))))
+    return float(np.floor(value * scale * (1 + 1e-12)) / scale)
+
+
 def _limit(value: float) -> str:
-    """Return a friction limit as text: infinity and NaN in words."""
+    """Return a friction limit as text, rounded down: infinities and NaN in words."""
     if np.isinf(value):
-        return WHOLE
-    return NONE if np.isnan(value) else number(value)
+        return WHOLE if value > 0 else NONE
+    return UNKNOWN if np.isnan(value) else significant(rounded_down(value), 4)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,9 +18,13 @@ from hipuq.report.damping import differences, preset_of, value_text
 from hipuq.report.partners import case_of
 from hipuq.report.reading import Reading, model_options, nominal_of
 from hipuq.report.summary import inputs_table, integrated
-from hipuq.report.table import Table, share
+from hipuq.report.table import Table, sentence, share
 
 INPUTS_TITLE, LIMITS_TITLE, REPEAT_TITLE = "Inputs", "Limits of the model", "How to repeat this"
+
+
+INPUT_CELLS = 5
+"""Cells of a row of inputs before that of the source."""
 
 
 def inputs(reading: Reading) -> Block:
@@ -36,8 +42,7 @@ def inputs(reading: Reading) -> Block:
     results, analysis = reading.results, reading.analysis
     if results is None or analysis is None:
         return Block("inputs", INPUTS_TITLE)
-    told = json.loads(reading.tree.attrs.get("sources") or "{}").get(analysis, {})
-    tables = [inputs_table(results, told), *regime_tables(results), fixed_table(reading, results)]
+    tables = [*drawn_tables(reading, analysis, results), fixed_table(reading, results)]
     others = [
         name
         for name, groups in reading.found.items()
@@ -49,20 +54,78 @@ def inputs(reading: Reading) -> Block:
     return Block("inputs", INPUTS_TITLE, lines, text=[table for table in tables if table.rows])
 
 
-def regime_tables(results: xr.Dataset) -> list[Table]:
-    """Return the regimes of inputs that are mixtures of named ones, with the source of each."""
+def drawn_tables(reading: Reading, analysis: str, results: xr.Dataset) -> list[Table]:
+    """Return the uncertain inputs of an analysis with their sources, and the regimes of those that have any.
+
+    Parameters
+    ----------
+    reading : Reading
+    analysis : str
+    results : Dataset
+        Those of the analysis.
+    """
+    told = dict(json.loads(reading.tree.attrs.get("sources") or "{}").get(analysis, {}))
+    for name in _mixtures(results):
+        told.setdefault(name, "see below")
+    return [inputs_table(results, told), *regime_tables(results)]
+
+
+def differing(reading: Reading, analysis: str, results: xr.Dataset) -> tuple[list[Table], str]:
+    """Return the inputs of an analysis that are not those of the headline, and a sentence on the others.
+
+    Parameters
+    ----------
+    reading : Reading
+    analysis : str
+    results : Dataset
+        Those of the analysis.
+
+    Returns
+    -------
+    tables : list of Table
+        All inputs where there is no headline; none where they are those of the headline.
+    told : str
+        Empty where there is no headline.
+    """
+    first, *mixed = drawn_tables(reading, analysis, results)
+    head = reading.results
+    if head is None:
+        return [first, *mixed], ""
+    known = {row[0]: row[:INPUT_CELLS] for row in inputs_table(head).rows}
+    rows = [row for row in first.rows if row[:INPUT_CELLS] != known.get(row[0])]
+    gone = [name for name in known if name not in {row[0] for row in first.rows}]
+    others = len(first.rows) - len(rows)
+    lines = [f"Not drawn here: {', '.join(gone)}"] if gone else []
+    if others:
+        text = f"the {'other ' if rows else ''}uncertain inputs are those of the headline"
+        lines.append(text if lines else sentence(text))
+    titles = {_regimes_title(row[0]) for row in rows}
+    own = replace(first, title="Uncertain inputs that are not those of the headline", rows=rows)
+    return [own, *(table for table in mixed if table.title in titles)], "; ".join(lines)
+
+
+def _regimes_title(name: str) -> str:
+    return f"Regimes of {name.replace('_', ' ')}"
+
+
+def _mixtures(results: xr.Dataset) -> dict[str, Mapping[str, Any]]:
+    """Return the inputs that are mixtures of named regimes, with their descriptions."""
     drawn = json.loads(results.attrs.get("inputs") or "{}")
-    descriptions = {name: entry["distribution"] for name, entry in drawn.items() if "distribution" in entry}
+    found = {name: entry["distribution"] for name, entry in drawn.items() if "distribution" in entry}
+    found |= dict(integrated(results))
+    return {name: one for name, one in found.items() if regimes(one)}
+
+
+def regime_tables(results: xr.Dataset) -> list[Table]:
+    """Return the regimes that are drawn of inputs that are mixtures of named ones, with their sources."""
     made = []
-    for name, description in (descriptions | dict(integrated(results))).items():
-        rows = [
-            [one.name, share(one.weight, 3), one.distribution, one.source] for one in regimes(description)
-        ]
-        if rows:
-            ratio = sources(description).get(LAMBDA_RATIO, "")
-            note = f"Probabilities of the regimes from the {LAMBDA_RATIO}, {ratio}" if ratio else ""
-            columns = ["regime", "probability", "distribution", "source"]
-            made.append(Table(f"Regimes of {name.replace('_', ' ')}", columns, rows, note))
+    for name, description in _mixtures(results).items():
+        drawn = [one for one in regimes(description) if one.weight > 0]
+        rows = [[one.name, share(one.weight, 3), one.distribution, one.source] for one in drawn]
+        ratio = sources(description).get(LAMBDA_RATIO, "")
+        note = f"Probabilities of the regimes from the {LAMBDA_RATIO}, {ratio}" if ratio else ""
+        columns = ["regime", "probability", "distribution", "source"]
+        made.append(Table(_regimes_title(name), columns, rows, note))
     return made
 
 
@@ -93,7 +156,7 @@ def fixed_table(reading: Reading, results: xr.Dataset) -> Table:
         size = np.size(value)
         rows.append([name, meaning, text, unit, f"{size} elements, {role}" if size > 1 else role, source])
     return Table(
-        "Values that are not uncertain", ["parameter", "meaning", "value", "unit", "", "source"], rows
+        "Nominal and fixed values", ["parameter", "meaning", "value", "unit", "role", "source"], rows
     )
 
 
@@ -149,7 +212,9 @@ def repeat(reading: Reading) -> Block:
         if chosen:
             rows.append([f"model of {reading.analysis}", _options(chosen)])
     line = f"Save the study file at the end of this page as {study}/study.toml and run the command"
-    return Block("repeat", REPEAT_TITLE, [line], text=[Table("Versions, seeds and options", ["", ""], rows)])
+    return Block(
+        "repeat", REPEAT_TITLE, [line], text=[Table("Versions, seeds and options", ["what", "value"], rows)]
+    )
 
 
 def _options(given: dict[str, Any]) -> str:

@@ -7,16 +7,13 @@ import xarray as xr
 
 from hipuq import schema
 from hipuq.report.block import Block
-from hipuq.report.damping import changed_words, percent_of
-from hipuq.report.reading import DAMPING, Reading, probability_name
+from hipuq.report.damping import changed_words, damping_words, percent_of
+from hipuq.report.reading import DAMPING, Reading, nominal_of, probability_name
 from hipuq.report.summary import friction_words, interval
-from hipuq.report.table import MISSING, Table, fitting, share
+from hipuq.report.table import Table, fitting, plain, share
 from hipuq.sweeping import at
 
 TITLE = "P(squeak) over the modal damping ratio"
-
-BRIEF_COLUMNS = 11
-"""Damping ratios that a screen has room for."""
 
 SMALL = 0.001
 """Probabilities below it are told with more decimals."""
@@ -41,10 +38,10 @@ def over_damping(reading: Reading) -> Block:
     if not curves:
         line = (
             "No analysis is swept over the damping ratio: over = { damping_ratio = [0.0, 0.01] } in an "
-            "analysis of "
-            "any_unstable would show what damping does"
+            "analysis of any_unstable would show what damping does"
         )
-        return Block("damping", TITLE, [line] if reading.results is not None else [])
+        asked = reading.results is not None and DAMPING in nominal_of(reading.results)
+        return Block("damping", TITLE, [line] if asked else [])
     first = next(iter(curves))
     lines = [f"{in_words(curves[first])} ({first})"]
     if reading.analysis is not None and reading.analysis not in curves:
@@ -52,9 +49,27 @@ def over_damping(reading: Reading) -> Block:
             f"The headline's analysis, {reading.analysis!r}, is not swept over damping; {first!r} is the "
             "nearest to it"
         )
-    return Block(
-        "damping", TITLE, lines, [_table(curves)], [_described(curves)], brief=[_across(curves), lines[0]]
-    )
+    beside = besides(reading)
+    brief: list[str | Table] = [_across(curves, reading.assumed[first][DAMPING].value)]
+    if beside:
+        lines.append(beside)
+        brief.append(beside)
+    return Block("damping", TITLE, lines, [_table(curves)], [_described(curves)], brief=brief)
+
+
+def besides(reading: Reading) -> str:
+    """Return in a sentence that the headline's damping is none of those of the sweep; empty where it is."""
+    curves = reading.swept_over(DAMPING)
+    if reading.results is None or not curves or not all(map(reading.apart, curves)):
+        return ""
+    own = damping_words(reading.results) or "none is told"
+    return f"The headline's damping ({own}) is none of these values"
+
+
+def ends(curve: xr.Dataset) -> str:
+    """Return the first and the last probability over damping, such as ``0.6908 to 0.2385``."""
+    values = curve[_name(curve)].values.astype(np.float64)
+    return f"{plain(float(values[0]))} to {plain(float(values[-1]))}"
 
 
 def in_words(curve: xr.Dataset) -> str:
@@ -71,16 +86,20 @@ def in_words(curve: xr.Dataset) -> str:
     if not known.size:
         return "P(squeak) is not known at any damping ratio"
     first, last = (_cell(curve, float(ratios[i])) for i in (known[0], known[-1]))
-    ends = f"{first} at {percent_of(ratios[known[0]])} to {last} at {percent_of(ratios[known[-1]])}"
+    told = f"{first} at {percent_of(ratios[known[0]])} to {last} at {percent_of(ratios[known[-1]])}"
     if known.size == 1:
         where = percent_of(ratios[known[0]])
         return f"P(squeak) is {first} at {where} modal damping, the one value with a verdict"
     steps = np.diff(values[known])
+    if not steps.any():
+        where = "every damping ratio" if known.size == values.size else "every damping ratio with a verdict"
+        between = f"{percent_of(ratios[0])} to {percent_of(ratios[-1])}"
+        return f"P(squeak) is {plain(float(values[known[0]]))} at {where}, {between}"
     if (steps <= 0).all():
-        return f"P(squeak) falls from {ends} modal damping" if steps.any() else f"P(squeak) stays: {ends}"
+        return f"P(squeak) falls from {told} modal damping"
     low, high = share(float(np.nanmin(values))), share(float(np.nanmax(values)))
     return (
-        f"P(squeak) goes from {ends} modal damping, not falling throughout: it lies between {low} and {high}"
+        f"P(squeak) goes from {told} modal damping, not falling throughout: it lies between {low} and {high}"
     )
 
 
@@ -128,16 +147,23 @@ def _described(curves: Curves) -> Table:
     return Table("What these analyses are of", ["analysis", "model", "friction"], rows)
 
 
-def _across(curves: Curves) -> Table:
-    """Return a column for each damping ratio, as far as there is room, with the values alone."""
-    ratios = _ratios(curves)
-    places = np.unique(np.linspace(0, len(ratios) - 1, min(len(ratios), BRIEF_COLUMNS)).round().astype(int))
-    kept = [ratios[i] for i in places]
+def _value(curve: xr.Dataset, ratio: float) -> str:
+    """Return the probability at a damping ratio alone; one that is above 0 is never 0."""
+    if not _cell(curve, ratio):
+        return ""
+    one = at(curve, damping_ratio=ratio)
+    value = float(one[probability_name(one)])
+    return f"{value:.0e}" if 0 < value < 0.00005 else share(value)
+
+
+def _across(curves: Curves, chosen: float) -> Table:
+    """Return a column for each damping ratio, that of the headline to be kept, with the values alone."""
+    kept = _ratios(curves)
     rows = []
     for name, one in curves.items():
         cells = []
         for ratio in kept:
-            text = _cell(one, ratio)
-            cells.append(text.split(" (")[0][:6] if text != MISSING else text)
+            cells.append(_value(one, ratio))
         rows.append([name, *cells])
-    return Table("", ["modal damping", *map(percent_of, kept)], rows)
+    at = int(np.argmin(np.abs(np.array(kept) - chosen)))
+    return Table("", ["damping", *map(percent_of, kept)], rows, keep=tuple(sorted({0, 1, at + 1, len(kept)})))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import json
 import os
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,11 @@ from hipuq import schema
 from hipuq.errors import StoreError
 from hipuq.report import comparison as methods
 from hipuq.report.comparison_winner import winner_words
+from hipuq.report.csv import csv_text
 from hipuq.report.damping import label
 from hipuq.report.figures import pictures
 from hipuq.report.first_part import blocks
+from hipuq.report.grounds import differing
 from hipuq.report.partners import comparison
 from hipuq.report.reading import Reading
 from hipuq.report.sensitivity import has_indices, note, remarks
@@ -86,6 +87,7 @@ def write_report(tree: xr.DataTree, folder: str | os.PathLike[str]) -> Path:
             autoescape=True,
             undefined=jinja2.StrictUndefined,
         )
+        environment.filters["csv"] = csv_text
         page = environment.get_template("template.html").render(content(tree, images))
         file = target / "report.html"
         file.write_text(page, encoding="utf-8")
@@ -152,7 +154,7 @@ def section(reading: Reading, analysis: str) -> dict[str, Any]:
     """
     found = dict(estimates(reading.found[analysis]))
     first = next(iter(found.values()))
-    sources = json.loads(reading.tree.attrs.get("sources") or "{}").get(analysis, {})
+    given, others = differing(reading, analysis, first)
     made = [table for results in found.values() for table in tables(results, reading.mode_names)]
     return {
         "name": analysis,
@@ -167,7 +169,8 @@ def section(reading: Reading, analysis: str) -> dict[str, Any]:
             f"{of}: {line}" if len(found) > 1 else line for of, one in found.items() for line in remarks(one)
         ]
         + _elsewhere(reading, analysis),
-        "inputs": inputs_table(first, sources),
+        "given": given,
+        "others": others,
         "tables": made,
         "exact": schema.is_exact(first),
         "integrated": bool(integrated(first)),

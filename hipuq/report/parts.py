@@ -7,18 +7,23 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from hipuq.report import chance
 from hipuq.report.block import Block, turned
 from hipuq.report.damping import at_damping
+from hipuq.report.frequency import between, decimals, unit_of, written
 from hipuq.report.over_damping import cell
 from hipuq.report.partners import summed_up
 from hipuq.report.reading import SQUEAK, Reading
 from hipuq.report.summary import group_table, limits_word, modes_shown
-from hipuq.report.table import MISSING, Table, share
+from hipuq.report.table import MISSING, Table, plain
 
 BY_MODE = ("unstable", "probability_by_mode")
 """Outcomes whose probability is that of each mode: sampled, and with friction integrated."""
 
 FREQUENCIES = ("frequency_low", "frequency_median", "frequency_high")
+
+MOST = 6
+"""Modes that a screen has room for, the most probable ones."""
 
 COUNT_TITLE, MODE_TITLE = "P(squeak) by number in contact", "P by mode, and its frequency"
 
@@ -67,18 +72,33 @@ def by_count(reading: Reading) -> Block:
         title="P(squeak) over the contact patterns of each number in contact",
     )
     lines = first = origin(reading, analysis, results)
+    lines = [*first, *_told(results)]
+    found_apart = chance.tested(results)
+    if words := chance.in_words(found_apart):
+        lines.append(words)
+    short = [said] if (said := chance.in_short(found_apart)) else []
+    return Block("count", COUNT_TITLE, lines, [table], brief=[_turned(table), *short, *first])
+
+
+def _told(results: xr.Dataset) -> list[str]:
+    """Return the mean with the fewest and with the most in contact, in a sentence."""
     ends = [float(results["probability_mean"][i]) for i in (0, -1)]
-    if results.sizes["count"] > 1 and np.isfinite(ends).all():
-        few, many = (int(results["count"][i]) for i in (0, -1))
-        told = f"With {few} in contact P is {share(ends[0])} on average, with {many} {share(ends[1])}"
-        lines = [*first, told]
-    return Block("count", COUNT_TITLE, lines, [table], brief=[_turned(table), *first])
+    if results.sizes["count"] < 2 or not np.isfinite(ends).all():
+        return []
+    few, many = (int(results["count"][i]) for i in (0, -1))
+    means = results["probability_mean"].values
+    if (means == means[0]).all() and means[0] in (0, 1):
+        return [f"P is {means[0]:g} with any number in contact from {few} to {many}"]
+    return [f"With {few} in contact P is {plain(ends[0])} on average, with {many} {plain(ends[1])}"]
 
 
 def _turned(table: Table) -> Table:
     """Return the table for a screen: mean, interval and range over the patterns, a column for each number."""
     wide = turned(table, "")
-    kept = [row for row in wide.rows if row[0] in ("mean", "interval", "bounds", "minimum", "maximum")]
+    cells = {row[0]: row[1:] for row in wide.rows}
+    ends = zip(cells["minimum"], cells["maximum"], strict=True)
+    cells["range"] = [low if low == high else f"{low} to {high}" for low, high in ends]
+    kept = [[name, *cells[name]] for name in ("mean", "interval", "bounds", "range") if name in cells]
     return Table("", ["in contact", *wide.columns[1:]], kept)
 
 
@@ -114,7 +134,8 @@ def by_mode(reading: Reading) -> Block:
     modes = modes_shown(own.rename({name: "probability"}) if name != "probability" else own, "probability")
     heads = ["mode", "pair", f"P ({limits_word(results)})"]
     if ranges is not None:
-        heads += ["5 % below [kHz]", "median [kHz]", "95 % below [kHz]"]
+        unit, _, _ = scale_of(ranges[1])
+        heads += [f"{text} [{unit}]" for text in ("5 % below", "median", "95 % below")]
     if reading.mode_names:
         heads.insert(2, "in the paper")
     rows = [_mode_row(reading, results, name, mode, None if ranges is None else ranges[1]) for mode in modes]
@@ -123,10 +144,24 @@ def by_mode(reading: Reading) -> Block:
     table = Table("P that a mode is unstable, and its frequency where it is", heads, rows)
     if words := frequency_words(ranges):
         lines.append(words)
-    made = [table] if rows else []
-    return Block(
-        "mode", MODE_TITLE, lines, made, brief=[*(Table("", t.columns, t.rows) for t in made), *lines]
-    )
+    if not rows:
+        return Block("mode", MODE_TITLE, lines, brief=list(lines))
+    likely = sorted(modes, key=lambda mode: -np.nan_to_num(float(results[name].sel(mode=mode))))[:MOST]
+    kept = [row for mode, row in zip(modes, rows, strict=True) if mode in likely]
+    rest = len(rows) - len(kept)
+    short = [f"and {rest} more, less probable; where unstable they vibrate at {_ends(ranges)}"]
+    short = short if rest and words else [f"and {rest} more, less probable"] if rest else [words]
+    from_ = [line for line in lines if line != words]
+    brief: list[str | Table] = [Table("", table.columns, kept)]
+    brief += [line for line in short if line] + from_
+    return Block("mode", MODE_TITLE, lines, [table], brief=brief)
+
+
+def scale_of(ranges: xr.Dataset) -> tuple[str, float, int]:
+    """Return unit, its size [Hz] and decimals that all frequencies of a table are told with."""
+    values = np.concatenate([ranges[key].values for key in FREQUENCIES])
+    unit, size = unit_of(values)
+    return unit, size, decimals(values, size, 4)
 
 
 def moded(reading: Reading) -> tuple[str, xr.Dataset, str] | None:
@@ -150,13 +185,18 @@ def frequencies(reading: Reading) -> tuple[str, xr.Dataset] | None:
 
 def frequency_words(ranges: tuple[str, xr.Dataset] | None) -> str:
     """Return between which frequencies squeak is predicted; empty where none is unstable."""
+    ends = _ends(ranges)
+    if not ends:
+        return ""
+    return f"Where modes are unstable they vibrate at {ends} (least 5 % and greatest 95 % quantile of a mode)"
+
+
+def _ends(ranges: tuple[str, xr.Dataset] | None) -> str:
+    """Return the least and the greatest frequency at which a mode is unstable; empty without any."""
     if ranges is None:
         return ""
     low, high = ranges[1]["frequency_low"].values, ranges[1]["frequency_high"].values
-    if not np.isfinite(low).any():
-        return ""
-    ends = f"{np.nanmin(low) / 1000:.3g} to {np.nanmax(high) / 1000:.3g} kHz"
-    return f"Where modes are unstable they vibrate at {ends} (least 5 % and greatest 95 % quantile of a mode)"
+    return between(float(np.nanmin(low)), float(np.nanmax(high))) if np.isfinite(low).any() else ""
 
 
 def _mode_row(
@@ -168,10 +208,9 @@ def _mode_row(
         row.insert(2, reading.mode_names.get(str(mode), ""))
     if ranges is not None:
         there = mode in ranges["mode"].values
+        _, size, places = scale_of(ranges)
         row += [
-            f"{float(ranges[key].sel(mode=mode)) / 1000:.3f}"
-            if there and np.isfinite(float(ranges[key].sel(mode=mode)))
-            else MISSING
+            written(float(ranges[key].sel(mode=mode)), size, places) if there else MISSING
             for key in FREQUENCIES
         ]
     return row

@@ -113,6 +113,19 @@ class Reading:
         """
         return next((name for name in self.assumed[analysis] if name != DAMPING), "")
 
+    def apart(self, analysis: str) -> bool:
+        """Say whether an analysis over damping is read at another damping than that of the headline.
+
+        What it gives there is then no other result for the same question.
+        """
+        head = self.results
+        if head is None or DAMPING not in self.assumed[analysis]:
+            return False
+        own = head.coords[DAMPING].item() if DAMPING in head.coords else nominal_of(head).get(DAMPING)
+        drawn = DAMPING in json.loads(head.attrs.get("inputs") or "{}")
+        value = self.assumed[analysis][DAMPING].value
+        return drawn or not isinstance(own, float | int) or not bool(np.isclose(own, value, 1e-9, 1e-15))
+
     def alike(self, analysis: str, key: str) -> str | None:
         """Return the analysis before this one with an identical group, such as the sweep over friction."""
         own = self.found[analysis][key]

@@ -90,9 +90,15 @@ def in_words(results: xr.Dataset) -> str:
         ends = " and ".join(share(float(one[f"ST_{end}"]), 2) for end in ("low", "high"))
         text += f"the indices are not resolved: the total-order index of {name} lies between {ends}; "
         return text + "more samples are needed"
-    text += f"{name} explains {_percent(one, 'S1')} of the variance alone, "
-    text += f"{_percent(one, 'ST')} with its interactions{_rivals(results, top)}"
-    if total.size > 1 and not bool(first.isnull().any()):
+    negative = (results["S1_high"] < 0).values if "S1_high" in results else np.zeros(total.size, bool)
+    if negative[top]:
+        text += f"{name} explains {_percent(one, 'ST')} of the variance with its interactions"
+    else:
+        text += f"{name} explains {_percent(one, 'S1')} of the variance alone, "
+        text += f"{_percent(one, 'ST')} with its interactions"
+    text += _rivals(results, top)
+    # Shares cannot be negative, nor less together than one of them: such estimates are too rough to add up.
+    if total.size > 1 and float(first.sum(skipna=False)) >= float(first.max()) and not negative.any():
         together = results[["S1"]].sum("parameter")
         text += f"; the {total.size} parameters alone explain {_percent(together, 'S1')} together"
     return text
@@ -266,6 +272,6 @@ def _samples(results: xr.Dataset, dims: str, places: list[tuple[str, xr.Dataset]
     said = {name: with_unit(str(results[name].attrs.get("long_name", name)), results[name]) for name in names}
     if not dims:
         rows = [[text, number(float(results[name]), 6)] for name, text in said.items()]
-        return Table("Samples", ["", "value"], rows)
+        return Table("Samples", ["quantity", "value"], rows)
     rows = [[label, *(number(float(one[name]), 6) for name in names)] for label, one in places]
     return Table("Samples", [dims, *said.values()], rows)

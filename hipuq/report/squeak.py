@@ -11,7 +11,8 @@ from hipuq import schema
 from hipuq.methods import METHODS
 from hipuq.report.block import Block
 from hipuq.report.damping import NONE, at_damping, damping_words, label, percent_of
-from hipuq.report.reading import DAMPING, Reading, model_options, probability_name
+from hipuq.report.reading import DAMPING, SQUEAK, Reading, model_options, nominal_of, probability_name
+from hipuq.report.regimes import rests_on
 from hipuq.report.summary import integrated
 from hipuq.report.table import fitting, number, share
 
@@ -20,6 +21,16 @@ SAMPLERS = {"latin_hypercube": "latin hypercube", "sobol": "Sobol points"}
 
 SMALLEST = 1e-8
 """Probabilities below it are told with an exponent."""
+
+SMALL = 0.001
+"""Exact probabilities below it are told with more decimals."""
+
+BY_SAMPLING = "The interval is of sampling alone: what the inputs and the model leave open is not in it"
+
+ANALYSIS = "It is the analysis"
+
+MEANS = ("mean_corrected_overall", "mean_corrected", "mean_overall", "mean")
+"""Means of a verdict, or of a probability, the most telling first."""
 
 
 def lead(results: xr.Dataset) -> str:
@@ -51,8 +62,8 @@ def chance(results: xr.Dataset) -> str:
     known = _known(results)
     if exact:
         # Limits apart from the value by rounding alone say nothing.
-        bounds = f" (bounds {share(low, 8)} to {share(high, 8)})" if high - low > 1e-12 else ""
-        return f"= {share(value, 8)}{bounds}"
+        bounds = f" (bounds {_exact(low)} to {_exact(high)})" if high - low > 1e-12 else ""
+        return f"= {_exact(value)}{bounds}"
     if value == 0:
         return f"= 0: none of {known} is unstable; at most {_small(high)}{level}"
     if value == 1:
@@ -61,6 +72,11 @@ def chance(results: xr.Dataset) -> str:
     if value < SMALLEST:
         text = f"{value:.2g} ({low:.2g} to {high:.2g})"
     return f"= {text.removesuffix(')')}{level})" if text.endswith(")") else f"= {text}"
+
+
+def _exact(value: float) -> str:
+    """Return an exact probability: four decimals here, more of small ones; tables have all digits."""
+    return share(value, 4) if value == 0 or value >= SMALL else number(value, 3)
 
 
 def _small(value: float) -> str:
@@ -96,13 +112,24 @@ def method_words(results: xr.Dataset) -> str:
 
 def meaning(results: xr.Dataset) -> str:
     """Return in a sentence what the probability is of."""
-    threshold = float(model_options(results).get("growth_threshold") or 0.0)
-    what = f"a mode that grows faster than {threshold:g} 1/s" if threshold else "an unstable mode"
     return (
-        f"This is the probability that the model {results.attrs['model']} has {what} under the inputs "
-        "below; it "
-        "is a property of the model, not the share of patients whose hip squeaks"
+        f"This is the probability that the model {results.attrs['model']} has {_event(results)} under the "
+        "inputs below; it is a property of the model, not the share of patients whose hip squeaks"
     )
+
+
+TITLE = "Probability of squeak"
+
+
+def short_meaning(results: xr.Dataset) -> str:
+    """Return what `meaning` says, where there is little room."""
+    model = str(results.attrs["model"]).removesuffix(", friction integrated")
+    return f"Of {_event(results)} in {model}, not the share of patients whose hip squeaks"
+
+
+def _event(results: xr.Dataset) -> str:
+    threshold = float(model_options(results).get("growth_threshold") or 0.0)
+    return f"a mode that grows faster than {threshold:g} 1/s" if threshold else "an unstable mode"
 
 
 def headline(reading: Reading) -> Block:
@@ -119,13 +146,61 @@ def headline(reading: Reading) -> Block:
     """
     results = reading.results
     if results is None or reading.analysis is None:
-        line = (
+        lines = mean_of_verdict(reading) or [
             "No analysis gives a probability of any unstable mode: one of any_unstable, or of probability "
             "with friction integrated, by Monte Carlo or polynomial chaos would"
-        )
-        return Block("squeak", "Probability of squeak", [line], brief=[line])
-    lines = [meaning(results), *assumptions(reading)]
-    return Block("squeak", "Probability of squeak", [lead(results), *lines], brief=[lead(results), *lines])
+        ]
+        return Block("squeak", TITLE, lines, brief=list(lines))
+    long, short = rests_on(reading)
+    told = assumptions(reading)
+    lines = [meaning(results), told[0], *([long] if long else []), *told[1:]]
+    where = f" {words}" if (words := at_damping(results)) else ""
+    alone = "" if schema.is_exact(results) else "; the interval is of sampling alone"
+    brief = [f"P(squeak) {chance(results)}{where}", short_meaning(results), *([short] if short else [])]
+    brief.append(f"Analysis {reading.analysis!r}: {method_words(results)}{alone}")
+    # Only where it is not the one that was asked for it takes a reason.
+    kept = (line for line in told if line != BY_SAMPLING)
+    brief += [line for line in kept if not line.startswith(ANALYSIS) or ", since " in line]
+    return Block("squeak", TITLE, [lead(results), *lines], brief=brief)
+
+
+def mean_of_verdict(reading: Reading) -> list[str]:
+    """Return the mean of the verdict of an analysis without a probability, such as of Sobol indices.
+
+    Parameters
+    ----------
+    reading : Reading
+
+    Returns
+    -------
+    list of str
+        The mean with its interval, if it has one, and what would give one; nothing without a mean.
+    """
+    for name, groups in reading.found.items():
+        for of in SQUEAK:
+            results = groups.get(of)
+            if results is None or reading.at_one(name):
+                continue
+            key = next((key for key in MEANS if key in results and not results[key].ndim), "")
+            if not key or not np.isfinite(float(results[key])):
+                continue
+            value, ends = float(results[key]), [f"{key}_{end}" for end in ("low", "high")]
+            limited = all(end in results and np.isfinite(float(results[end])) for end in ends)
+            text = fitting(value, *(float(results[end]) for end in ends)) if limited else share(value, 3)
+            where = f" {words}" if (words := at_damping(results)) else ""
+            method = str(results.attrs["method"])
+            called = METHODS[method].title if method in METHODS else method
+            line = (
+                f"P(squeak) = {text}{where}, the mean of {of} over the samples of the analysis {name!r}; "
+                f"{called}, {int(results['evaluations']):,} evaluations"
+            )
+            if limited:
+                return [line]
+            return [
+                line,
+                "It has no interval: an analysis of any_unstable by Monte Carlo would give one with it",
+            ]
+    return []
 
 
 def assumptions(reading: Reading) -> list[str]:
@@ -136,22 +211,22 @@ def assumptions(reading: Reading) -> list[str]:
     why = "as the study asks" if asked == name else "the first with such a probability"
     if asked and asked != name:
         why = f"since {asked!r}, which the study asks for, gives no such probability"
-    lines = [f"It is the analysis {name!r}, {why}: {label(results)}"]
+    lines = [] if schema.is_exact(results) else [BY_SAMPLING]
+    lines.append(f"{ANALYSIS} {name!r}, {why}: {label(results)}")
     for parameter, at in reading.assumed[name].items():
         value = percent_of(at.value) if parameter == DAMPING else f"{at.value:g}"
         called = parameter.replace("_", " ")
-        lines.append(
-            f"The {called} of {value} is an assumption, {at.why}; the analysis ranges over others too"
-        )
+        lines.append(f"The {called} of {value} is an assumption, {at.why}; others are below")
     words = damping_words(results)
     if words and DAMPING not in reading.assumed[name]:
         given = "No damping is" if words == NONE else f"The damping ({words}) is"
-        more = (
-            "what damping does is told next"
-            if reading.swept_over(DAMPING)
-            else "an analysis over the damping ratio would tell what it does"
-        )
-        lines.append(f"{given} an assumption; {more}")
+        if reading.swept_over(DAMPING):
+            more = "; what damping does is told next"
+        elif DAMPING in nominal_of(results):
+            more = "; an analysis over the damping ratio would tell what it does"
+        else:
+            more = ""
+        lines.append(f"{given} an assumption{more}")
     if "trusted" in results and not bool((results["trusted"] != 0).all()):
         lines.append("The surrogate behind it is not to be trusted, so its interval is wide, or wrong")
     if undecided := int(results["undecided"]) + int(results["failed"]):

@@ -9,12 +9,13 @@ import numpy as np
 import xarray as xr
 
 from hipuq import plots
-from hipuq.report import method_figures
+from hipuq.report import chance, method_figures
 from hipuq.report.bench import published
 from hipuq.report.damping import at_damping
 from hipuq.report.drivers import driving
 from hipuq.report.friction import curve, group
-from hipuq.report.partners import exact_of
+from hipuq.report.over_damping import besides
+from hipuq.report.partners import exact_of, summed_up
 from hipuq.report.parts import BY_MODE, counted, frequencies, moded
 from hipuq.report.picture import Picture, figure_of
 from hipuq.report.reading import DAMPING, Reading
@@ -56,6 +57,8 @@ def _damping(reading: Reading) -> Iterator[Picture]:
     incidence = published(reading, "incidence")
     ax = plots.probability_over(curves, literature=incidence)
     caption = "P(squeak) over the modal damping ratio, with its interval."
+    if beside := besides(reading):
+        caption += f" {beside}."
     if incidence is not None:
         caption += (
             " Band: the incidence of squeak reported in patients. It is another quantity, so that the two "
@@ -75,23 +78,37 @@ def _counts(reading: Reading) -> Iterator[Picture]:
         caption = "P(squeak) for each number in contact: mean and range over its contact patterns."
         if exact is not None:
             caption += f" Bars: the same without sampling ({other})."
+        else:
+            caption += chance.caption(chance.tested(results))
         figure = figure_of(plots.by_count(results, exact=exact))
         yield Picture(analysis, "by_count", caption, figure, "count")
         if results.sizes.get("pattern", 0) >= PATTERNS and "contact" in results.coords:
-            caption = "Each column is a contact pattern: its oscillators in contact, by its P(squeak)."
-            yield Picture(analysis, "pattern_map", caption, figure_of(plots.pattern_map(results)), "count")
+            yield _map(reading, analysis, results, other)
     for analysis in reading.ranked:
         results_of = (reading.found[analysis].get(of) for of in BY_MODE)
         by_pattern = next((one for one in results_of if one is not None and _by_pattern(one)), None)
         if by_pattern is not None:
+            other = exact_of(by_pattern, reading.found) if summed_up(by_pattern, {"count", "mode"}) else None
+            if other is not None and _by_pattern(one := reading.found[other][BY_MODE[1]]):
+                analysis, by_pattern = other, one
             names = {int(mode): name for mode, name in reading.mode_names.items()}
             caption = (
                 f"P of each mode over the contact patterns ({analysis}): box from the first to the third "
                 "quartile, with the median; whiskers to the least and the greatest."
-            )
+            ) + chance.caption(chance.tested(by_pattern))
             figure = figure_of(plots.boxplots(by_pattern, names=names or None))
             yield Picture(analysis, "boxplots", caption, figure, "count")
             return
+
+
+def _map(reading: Reading, analysis: str, results: xr.Dataset, exact: str | None) -> Picture:
+    """Return the map of the patterns, from exact results of the same where there are some."""
+    caption = "Each column is a contact pattern: its oscillators in contact, by its P(squeak)"
+    if exact is not None and "contact" in (one := reading.found[exact]["probability"]).coords:
+        caption += f", without sampling ({exact})."
+        return Picture(exact, "pattern_map", caption, figure_of(plots.pattern_map(one)), "count")
+    caption += f" ({analysis}).{chance.caption(chance.tested(results))}"
+    return Picture(analysis, "pattern_map", caption, figure_of(plots.pattern_map(results)), "count")
 
 
 def _by_pattern(results: xr.Dataset) -> bool:

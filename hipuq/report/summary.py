@@ -136,9 +136,14 @@ def group_table(results: xr.Dataset, quantity: str) -> Table:
         mean, low, high, least, most, by_weight = (text(float(part[f"{quantity}_{end}"])) for end in ends)
         between = [f"{low} to {high}"] if limits else []
         rows.append([str(value), str(size), mean, *between, least, most, *([by_weight] if weighted else [])])
-    columns = [_heading(results, group), "levels", "mean", *([limits_word(results)] if limits else [])]
+    columns = [
+        _heading(results, group),
+        levels_word(results),
+        "mean",
+        *([limits_word(results)] if limits else []),
+    ]
     columns += ["minimum", "maximum", *(["weighted mean"] if weighted else [])]
-    return Table(f"{_title(results, quantity)}; over the levels of each group", columns, rows)
+    return Table(f"{_title(results, quantity)}; over the {levels_word(results)} of each group", columns, rows)
 
 
 def _by_mode_and_group(results: xr.Dataset, quantity: str, names: dict[str, str] | None) -> list[Table]:
@@ -166,7 +171,11 @@ def _by_mode_and_group(results: xr.Dataset, quantity: str, names: dict[str, str]
         heading = _heading(results, group).removeprefix("oscillators ")
         columns = ["mode", *(f"{value} {heading}" for value, _ in groups)]
         made.append(
-            Table(f"{_title(results, quantity)}; {title} over the levels of each group", columns, rows)
+            Table(
+                f"{_title(results, quantity)}; {title} over the {levels_word(results)} of each group",
+                columns,
+                rows,
+            )
         )
     return made
 
@@ -188,6 +197,12 @@ def _by_mode(results: xr.Dataset, quantity: str, names: dict[str, str] | None) -
 def limits_word(results: xr.Dataset) -> str:
     """Return what the limits of results are called in a heading."""
     return "bounds" if schema.is_exact(results) else "interval"
+
+
+def levels_word(results: xr.Dataset) -> str:
+    """Return what the levels that are summed up by group are called."""
+    group = str(results.attrs.get("levels_group", ""))
+    return "patterns" if group in results.coords and results[group].dims == ("pattern",) else "levels"
 
 
 def _heading(results: xr.Dataset, group: str) -> str:

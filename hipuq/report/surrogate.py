@@ -83,7 +83,7 @@ def tables(results: xr.Dataset, dims: str, places: list[tuple[str, xr.Dataset]])
     names = [name for base in (*FIT, *GIVES) if (name := _overall(results, base))]
     rows = [[_heading(results, name), _value(results, name)] for name in names]
     rows.append(["to be trusted", _trusted(results)])
-    made = [Table("Polynomial chaos: how it fits, and what it gives", ["", "value"], rows)]
+    made = [Table("Polynomial chaos: how it fits, and what it gives", ["quantity", "value"], rows)]
     if "quantiles" in results and results["quantiles"].dims == ("quantile",):
         columns = ["below", *(f"{100 * float(level):g} %" for level in results["quantile"].values)]
         row = [number(float(value)) for value in results["quantiles"].values]

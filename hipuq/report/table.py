@@ -34,12 +34,15 @@ class Table:
         Cells as they are shown; a line break in one stays.
     note : str
         What its marks mean; may be empty.
+    keep : tuple of int
+        Columns that stay where there is too little room for all; empty where none may go.
     """
 
     title: str
     columns: list[str]
     rows: list[list[str]]
     note: str = ""
+    keep: tuple[int, ...] = ()
 
 
 def number(value: float, digits: int = 4) -> str:
@@ -51,6 +54,11 @@ def share(value: float, digits: int = 4) -> str:
     """Return a probability, or another share, as text with fixed decimals."""
     # Adding 0 takes the sign from a rounded 0.
     return MISSING if np.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def plain(value: float) -> str:
+    """Return a probability for a sentence: 0 and 1 as such, others with four decimals."""
+    return f"{value:g}" if value in (0, 1) else share(value)
 
 
 def significant(value: float, digits: int = 3) -> str:

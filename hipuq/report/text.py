@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import xarray as xr
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table as RichTable
 
 from hipuq import schema
 from hipuq.errors import check_name
@@ -15,13 +12,14 @@ from hipuq.report import comparison as methods
 from hipuq.report.comparison_error import error_table
 from hipuq.report.damping import damping_words, label
 from hipuq.report.first_part import blocks
-from hipuq.report.over_damping import cell
+from hipuq.report.over_damping import cell, ends
 from hipuq.report.partners import comparison
-from hipuq.report.reading import SQUEAK, Reading, probability_name
+from hipuq.report.printing import printed
+from hipuq.report.reading import DAMPING, SQUEAK, Reading, probability_name
 from hipuq.report.sensitivity import has_indices, remarks
 from hipuq.report.summary import comparisons, estimates, headline, integrated, tables, trust
 from hipuq.report.sweeps import assumed_words, sweep_table
-from hipuq.report.table import Table, listed
+from hipuq.report.table import listed
 
 UNFOLDED = 10_000
 """Width of a pipe: what is read there line by line must neither be folded nor cut off."""
@@ -67,7 +65,7 @@ def show_results(
                     f"[bold]{escape(part)}[/bold]" if i == 0 and block.key == "squeak" else escape(part)
                 )
             else:
-                screen.print(printed(part))
+                screen.print(printed(part, screen.width))
     if not everything:
         _lines(reading, screen)
     for name in reading.found if everything else ():
@@ -96,8 +94,11 @@ def _lines(reading: Reading, screen: Console) -> None:
         # The label of the model says it too.
         told = [f"{method}, friction integrated" if integrated(results) and not models else method]
         over = [parameter.replace("_", " ") for parameter in reading.assumed[name]]
+        whole = reading.swept_over(DAMPING).get(name) if reading.apart(name) else None
         if reading.at_one(name):
             told += [label(results) if models else "", of]
+        elif whole is not None:
+            told += [label(whole) if models else damping_words(whole), f"P {ends(whole)}"]
         else:
             told += [label(results) if models else damping_words(results), _short(results, of)]
         told += [f"swept over {listed(over)}"] if over else []
@@ -130,13 +131,13 @@ def _show_analysis(reading: Reading, analysis: str, screen: Console) -> None:
             if words := assumed_words(reading, analysis):
                 screen.print(escape(words))
         if (over := sweep_table(reading, analysis, of)) is not None:
-            screen.print(printed(over))
+            screen.print(printed(over, screen.width))
         indices = has_indices(results)
         if "mode" not in results.dims or indices:
             for line in filter(None, [headline(results), *remarks(results)]):
                 screen.print(escape(line))
         for table in tables(results, reading.mode_names)[: 2 if indices else 1]:
-            screen.print(printed(table))
+            screen.print(printed(table, screen.width))
     if line := comparison(analysis, reading.found):
         screen.print(escape(line))
 
@@ -147,7 +148,7 @@ def _show_comparison(problem: str, race: xr.Dataset, screen: Console) -> None:
     for line in methods.facts(race):
         screen.print(escape(line))
     table = error_table(race, brief=True)
-    screen.print(printed(table))
+    screen.print(printed(table, screen.width))
     for line in filter(None, [table.note, *methods.summary(race)]):
         screen.print(escape(line))
 
@@ -158,15 +159,3 @@ def screen_for(console: Console | None) -> Console:
         return console
     piped = not Console().is_terminal
     return Console(highlight=False, soft_wrap=piped, width=UNFOLDED if piped else None)
-
-
-def printed(table: Table) -> RichTable:
-    """Return a table as it is printed."""
-    title = escape(table.title) if table.title else None
-    made = RichTable(title=title, title_justify="left", title_style="none", box=None)
-    for i, column in enumerate(table.columns):
-        heading = "\n".join(textwrap.wrap(column, 10, break_long_words=False))
-        made.add_column(escape(heading), justify="left" if i == 0 else "right", overflow="fold")
-    for row in table.rows:
-        made.add_row(*map(escape, row))
-    return made

@@ -7,8 +7,8 @@ import xarray as xr
 
 from hipuq.report.block import Block
 from hipuq.report.damping import damping_words
-from hipuq.report.over_damping import cell
-from hipuq.report.reading import Groups, Reading, probability_name
+from hipuq.report.over_damping import cell, ends
+from hipuq.report.reading import DAMPING, Groups, Reading, probability_name
 from hipuq.report.table import MISSING, Table, count, listed, number
 
 TITLE = "Numerical trust"
@@ -41,7 +41,10 @@ def verdicts(reading: Reading) -> Block:
             continue
         counts = [int(results[0][key].sum()) for key in ("evaluations", "undecided", "failed")]
         total += counts
-        told = [damping_words(_shown(reading, name, results[0])), _probability(reading, name)]
+        of = _shown(reading, name, results[0])
+        if reading.apart(name):
+            of = groups.get(str(of.attrs["of"]), of)
+        told = [damping_words(of), _probability(reading, name)]
         rows.append([name, *map(count, counts), *_decided(groups), *told])
     if not rows:
         return Block("trust", TITLE)
@@ -56,7 +59,9 @@ def verdicts(reading: Reading) -> Block:
         + _shares(reading)
     ]
     lines += settled_words(reading.results) if reading.results is not None else []
-    return Block("trust", TITLE, lines, [table], brief=list(lines))
+    shortest = [line.partition(";")[0] for line in lines]
+    brief = "; ".join([shortest[0], *(f"{line[0].lower()}{line[1:]}" for line in shortest[1:])])
+    return Block("trust", TITLE, lines, [table], brief=[brief])
 
 
 def _shown(reading: Reading, name: str, other: xr.Dataset) -> xr.Dataset:
@@ -95,6 +100,8 @@ def _probability(reading: Reading, name: str) -> str:
     if parameter := reading.at_one(name):
         return f"over {parameter.replace('_', ' ')}"
     one = reading.squeak(name)
+    if one is not None and reading.apart(name):
+        return ends(reading.swept_over(DAMPING)[name])
     return "" if one is None else cell(one, probability_name(one))
 
 

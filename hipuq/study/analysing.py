@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from hipuq import schema
+from hipuq.combinations import at, gathered, points
 from hipuq.driver import completed, estimated, method_named
 from hipuq.evaluation import evaluate, together
 from hipuq.fragility_curve import fragility
@@ -18,9 +19,9 @@ from hipuq.friction_limits import friction_limit
 from hipuq.models import CEAModel
 from hipuq.occurring import frequency_ranges, verdict_counts
 from hipuq.store import load_outcomes, save_outcomes
+from hipuq.study.headline import DAMPING, FRICTION, OF_ANY_MODE
 from hipuq.study.plan import Analysis
 from hipuq.study.tables import ReportTable
-from hipuq.sweeping import gathered, points
 
 Groups = dict[str, xr.Dataset]
 """Name of a group of the results -> its Dataset."""
@@ -29,8 +30,8 @@ INTEGRATED = ("onset", "interval")
 """Outcomes kept of a model whose friction is integrated: fragility and friction limits follow from them."""
 
 
-BESIDE = ("verdicts", "fragility", "onsets", "friction_limit", "frequencies")
-"""Groups of an analysis that follow from its outcomes without its method."""
+DRAWS = ("monte_carlo",)
+"""Methods whose samples are draws of the inputs, or of strata of them."""
 
 
 def analysed(
@@ -61,8 +62,8 @@ def analysed(
     -------
     dict
         ``<analysis>/<of>`` for each outcome; ``<analysis>/verdicts``; with friction integrated
-        ``<analysis>/fragility``, ``onsets`` and ``friction_limit``; where ``unstable`` is analysed
-        ``<analysis>/frequencies``.
+        ``<analysis>/fragility``, ``onsets`` and ``friction_limit``, the last one of a sweep over friction
+        too; where ``unstable`` is analysed ``<analysis>/frequencies``.
     """
     method = method_named(analysis.method)
     found: list[xr.Dataset] = []
@@ -85,8 +86,8 @@ def analysed(
         for of in analysis.of:
             results = estimated(method, outcomes, analysis.inputs, of=of, **analysis.options["estimate"])
             parts.setdefault(of, []).append(results)
-        for name, shown in beside(analysis, report, outcomes).items():
-            parts.setdefault(name, []).append(shown)
+        for name in _derived(analysis):
+            parts.setdefault(name, []).append(DERIVED[name](analysis, report, outcomes))
     whole = reduce(together, found)
     save_outcomes(whole, folder / "outcomes" / f"{analysis.name}.zarr")
     open_ = int((whole["status"] == schema.STATUS["undecided"]).sum())
@@ -94,7 +95,9 @@ def analysed(
         f"{analysis.name}: {whole.sizes['sample']:,} evaluations of {analysis.model.label} in "
         f"{whole.attrs['seconds']:.1f} s, {open_:,} undecided"
     )
-    return {f"{analysis.name}/{name}": gathered(own, analysis.over) for name, own in parts.items()}
+    groups = {name: gathered(own, analysis.over) for name, own in parts.items()}
+    groups |= _limits_of_a_sweep(analysis, report, groups)
+    return {f"{analysis.name}/{name}": own for name, own in groups.items()}
 
 
 def _kept(analysis: Analysis) -> tuple[str, ...]:
@@ -104,36 +107,66 @@ def _kept(analysis: Analysis) -> tuple[str, ...]:
     return ("frequency",) if "unstable" in analysis.of else ()
 
 
-def beside(analysis: Analysis, report: ReportTable, outcomes: xr.Dataset) -> Groups:
-    """Return what the report shows of outcomes besides what the method estimates.
-
-    Parameters
-    ----------
-    analysis : Analysis
-    report : ReportTable
-    outcomes : Dataset
-        At one combination of what is swept.
-
-    Returns
-    -------
-    dict
-        Name, one of `BESIDE` -> its Dataset, as far as the outcomes have it.
-    """
-    shown = {"verdicts": verdict_counts(outcomes)}
-    if "onset" in outcomes and "interval" in outcomes and _plain(outcomes):
-        lower, upper = outcomes["onset"].attrs["range"]
-        grid = np.linspace(lower, upper, report.fragility_points)
-        confidence = float(analysis.options["estimate"].get("confidence", 0.95))
-        shown["fragility"] = fragility(outcomes, grid, confidence=confidence)
-        shown["onsets"] = schema.stamp(outcomes[["onset"]], "onsets", like=outcomes.attrs)
-        shown["friction_limit"] = friction_limit(outcomes, report.targets, confidence=confidence)
-    if "unstable" in analysis.of and "frequency" in outcomes:
-        shown["frequencies"] = frequency_ranges(outcomes)
-    return shown
+def _derived(analysis: Analysis) -> tuple[str, ...]:
+    """Return which of `DERIVED` an analysis has."""
+    # Of samples that are no plain draws no share is a probability.
+    drawn = isinstance(analysis.model, FrictionIntegrated) and analysis.method in DRAWS
+    return (
+        "verdicts",
+        *(("fragility", "onsets", "friction_limit") if drawn else ()),
+        *(("frequencies",) if "unstable" in analysis.of and not drawn else ()),
+    )
 
 
-def beside_again(analysis: Analysis, report: ReportTable, folder: Path, before: Groups) -> Groups:
-    """Return what the report shows beside results that are kept, from stored outcomes.
+def _confidence(analysis: Analysis) -> float:
+    return float(analysis.options["estimate"].get("confidence", 0.95))
+
+
+def _fragility(analysis: Analysis, report: ReportTable, outcomes: xr.Dataset) -> xr.Dataset:
+    lower, upper = outcomes["onset"].attrs["range"]
+    grid = np.linspace(lower, upper, report.fragility_points)
+    return fragility(outcomes, grid, confidence=_confidence(analysis))
+
+
+DERIVED: dict[str, Callable[[Analysis, ReportTable, xr.Dataset], xr.Dataset]] = {
+    "verdicts": lambda analysis, report, outcomes: verdict_counts(outcomes),
+    "fragility": _fragility,
+    "onsets": lambda analysis, report, outcomes: schema.stamp(
+        outcomes[["onset"]], "onsets", like=outcomes.attrs
+    ),
+    "friction_limit": lambda analysis, report, outcomes: friction_limit(
+        outcomes, report.targets, confidence=_confidence(analysis)
+    ),
+    "frequencies": lambda analysis, report, outcomes: frequency_ranges(outcomes),
+}
+"""Group beside the results of an analysis -> what makes it of the outcomes, without the method."""
+
+
+def _limits_of_a_sweep(analysis: Analysis, report: ReportTable, groups: Groups) -> Groups:
+    """Return the friction limits of an analysis over friction, by what else it is over."""
+    curve = next((groups[of] for of in OF_ANY_MODE if of in groups), None)
+    if curve is None or len(analysis.over.get(FRICTION, ())) < 2:
+        return {}
+    name = "probability_overall" if "probability_overall" in curve else "probability"
+    if name not in curve:
+        return {}
+    rest = {key: own for key, own in analysis.over.items() if key != FRICTION}
+    if set(curve[name].dims) != set(analysis.over):
+        return {}
+    plain = {f"probability{end}": curve[name + end] for end in ("", "_low", "_high")}
+    curve = xr.Dataset(plain, attrs=curve.attrs)
+    limits = [friction_limit(at(curve, **fixed), report.targets) for fixed in points(rest)]
+    return {"friction_limit": gathered(limits, rest)}
+
+
+def derived_again(
+    analysis: Analysis,
+    report: ReportTable,
+    folder: Path,
+    before: Groups,
+    say: Callable[[str], None] = lambda line: None,
+) -> Groups:
+    """Return what is shown beside results that are kept and is not there, from stored outcomes.
 
     Parameters
     ----------
@@ -142,30 +175,45 @@ def beside_again(analysis: Analysis, report: ReportTable, folder: Path, before: 
     folder : Path
         Output folder of the study.
     before : dict
-        Groups that are there already; nothing is read where these are all.
+        Groups that are there already.
+    say : callable, optional
+        Gets a line about what cannot be made again.
 
     Returns
     -------
     dict
-        Empty where there are no outcomes.
     """
+    own = {key.partition("/")[2]: group for key, group in before.items()}
+    found: Groups = {} if "friction_limit" in own else _limits_of_a_sweep(analysis, report, own)
+    missing = [name for name in _derived(analysis) if name not in own]
     stored = folder / "outcomes" / f"{analysis.name}.zarr"
-    if f"{analysis.name}/verdicts" in before or not stored.exists():
-        return {}
-    whole = load_outcomes(stored).load()
-    parts: dict[str, list[xr.Dataset]] = {}
+    if missing and stored.exists():
+        whole = load_outcomes(stored).load()
+        if {"onset", "interval"} <= set(whole.variables) or not {"onsets", "fragility"} & set(missing):
+            for name in list(missing):
+                if name == "frequencies" and "frequency" not in whole:
+                    continue
+                make = DERIVED[name]
+                parts = [make(analysis, report, one) for one in _by_value(whole, analysis)]
+                found[name] = gathered(parts, analysis.over)
+                missing.remove(name)
+    if missing:
+        say(
+            f"{analysis.name}: {', '.join(missing)} cannot be made from the outcomes that are stored; run "
+            "without --resume for the whole report"
+        )
+    return {f"{analysis.name}/{name}": group for name, group in found.items()}
+
+
+def _by_value(whole: xr.Dataset, analysis: Analysis) -> list[xr.Dataset]:
+    """Return outcomes at each combination of what is swept."""
+    parts = []
     for fixed in points(analysis.over):
         here = np.ones(whole.sizes["sample"], bool)
         for name, value in fixed.items():
             here &= whole[name].values == value
-        for name, shown in beside(analysis, report, whole.isel(sample=here)).items():
-            parts.setdefault(name, []).append(shown)
-    return {f"{analysis.name}/{name}": gathered(own, analysis.over) for name, own in parts.items()}
-
-
-def _plain(outcomes: xr.Dataset) -> bool:
-    """Say whether samples are draws of the inputs or strata of them: their shares are probabilities."""
-    return "matrix" not in outcomes.coords and "stratum" not in outcomes.coords
+        parts.append(whole.isel(sample=here))
+    return parts
 
 
 def at_nominal(analysis: Analysis, report: ReportTable, n_jobs: int | None, before: Groups) -> Groups:
@@ -190,9 +238,16 @@ def at_nominal(analysis: Analysis, report: ReportTable, n_jobs: int | None, befo
     if not isinstance(model, CEAModel):
         return groups
     sweep, shapes = f"{analysis.name}/friction_sweep", f"{analysis.name}/mode_shapes"
+    # An analysis over damping is shown at the headline's.
+    damping = report.damping_ratio if report.damping_ratio in analysis.over.get(DAMPING, ()) else None
+    fixed = {} if damping is None else {DAMPING: damping}
     if report.friction_sweep is not None and sweep not in before:
         grid = np.linspace(*report.friction_sweep, report.friction_points)
-        groups[sweep] = evaluate(model, model.nominal(friction=grid), n_jobs=n_jobs, progress=False)
+        samples = model.nominal(friction=grid, **{name: np.full(grid.size, v) for name, v in fixed.items()})
+        groups[sweep] = evaluate(model, samples, n_jobs=n_jobs, progress=False)
     if report.mode_shapes and shapes not in before:
-        groups[shapes] = model.mode_shapes(model.nominal(friction=report.shape_friction))
+        place = {FRICTION: report.shape_friction, **fixed}
+        found = model.mode_shapes(model.nominal(**place))
+        coords = {name: ((), value, schema.PARAMETERS[name].attrs) for name, value in place.items()}
+        groups[shapes] = found.assign_coords(coords)
     return groups

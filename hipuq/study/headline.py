@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hipuq.errors import InputError, check_name
 from hipuq.study.file import StudyFile
@@ -12,7 +12,7 @@ from hipuq.study.tables import AnalysisTable
 if TYPE_CHECKING:
     from hipuq.study.plan import Analysis
 
-DAMPING = "damping_ratio"
+DAMPING, FRICTION = "damping_ratio", "friction"
 
 DAMPING_SWEEP = "damping_sweep"
 """Name of the analysis over the damping ratio that a study adds by itself."""
@@ -36,10 +36,11 @@ def headline_of(table: StudyFile, analyses: Sequence[Analysis]) -> Analysis | No
     Returns
     -------
     Analysis or None
+        None where no analysis has one, or each has many, such as one over friction.
     """
     named = table.report.headline
     for one in analyses:
-        if one.name == named or (named is None and _tells(one)):
+        if one.name == named or (named is None and _tells(one) and set(one.over) <= {DAMPING}):
             return one
     return None
 
@@ -82,7 +83,7 @@ def check_headline(table: StudyFile, analyses: Sequence[Analysis]) -> None:
         )
 
 
-def damping_sweep(table: StudyFile, analyses: Sequence[Analysis]) -> AnalysisTable | None:
+def damping_sweep(table: StudyFile, analyses: Sequence[Analysis]) -> tuple[AnalysisTable, str] | None:
     """Return the analysis over the damping ratio that a study needs and does not have.
 
     Parameters
@@ -92,27 +93,32 @@ def damping_sweep(table: StudyFile, analyses: Sequence[Analysis]) -> AnalysisTab
 
     Returns
     -------
-    AnalysisTable or None
-        Of the model and inputs of the headline, friction sampled. None where an analysis is over the
-        damping ratio or draws it, the model has none, or the report asks for none.
+    table : AnalysisTable
+        Of the model and inputs of the headline, or of the first analysis, friction sampled; with its design
+        where that is no larger than asked. The nominal damping ratio is among its values.
+    like : str
+        The analysis whose model and inputs it has. None of both where an analysis is over the damping ratio
+        or draws it, the model has none, friction has no distribution, or the report asks for none.
     """
-    found = headline_of(table, analyses)
+    found = headline_of(table, analyses) or next(iter(analyses), None)
     if found is None or not table.report.damping_samples or DAMPING not in found.model.parameters:
         return None
     if any(one.name == DAMPING_SWEEP or DAMPING in one.over or DAMPING in one.inputs for one in analyses):
         return None
     entry = next(one for one in table.analysis if one.name == found.name)
+    if not (entry.integrate_friction or FRICTION in found.inputs) or found.over:
+        return None
     samples = table.report.damping_samples
-    if not entry.integrate_friction:
-        samples = min(samples, found.evaluations)
-    return entry.model_copy(
-        update={
-            "name": DAMPING_SWEEP,
-            "method": "monte_carlo",
-            "n": samples,
-            "integrate_friction": False,
-            "of": ["any_unstable"],
-            "options": {},
-            "over": {DAMPING: table.report.damping_ratios},
-        }
-    )
+    same = found.method == "monte_carlo" and not entry.integrate_friction and found.evaluations <= samples
+    nominal = float(found.model.parameters[DAMPING].nominal)
+    ratios = sorted({*table.report.damping_ratios, nominal})
+    update: dict[str, Any] = {
+        "name": DAMPING_SWEEP,
+        "method": "monte_carlo",
+        "n": entry.n if same else samples,
+        "integrate_friction": False,
+        "of": ["any_unstable"],
+        "options": entry.options if same else {},
+        "over": {DAMPING: ratios},
+    }
+    return entry.model_copy(update=update), found.name

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from hipuq.combinations import Values, points
 from hipuq.driver import method_named
 from hipuq.errors import HipuqError, InputError, StudyError, check_name
 from hipuq.friction import FrictionIntegrated
@@ -18,10 +19,10 @@ from hipuq.models.oscillator_ring import OscillatorRing
 from hipuq.sampling import seed_of
 from hipuq.study.building import distributions_of, model_of, without_friction
 from hipuq.study.file import StudyFile, read_study_file
-from hipuq.study.headline import check_headline, damping_sweep
+from hipuq.study.headline import check_headline, damping_sweep, headline_of
 from hipuq.study.problems import Problem, problems_of
 from hipuq.study.tables import AnalysisTable, ReportTable
-from hipuq.sweeping import Values, check_over, points
+from hipuq.sweeping import check_over
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,8 @@ class Analysis:
         Parameter -> values at which it is made; empty for an ordinary analysis.
     sources : mapping
         Input -> where its distribution is from, as far as the study says it.
-    implied : bool
-        Whether the study adds it by itself.
+    like : str
+        The analysis that it has model and inputs of, if the study adds it by itself; else empty.
     """
 
     name: str
@@ -64,7 +65,12 @@ class Analysis:
     evaluations: int
     over: Values = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
-    implied: bool = False
+    like: str = ""
+
+    @property
+    def implied(self) -> bool:
+        """Whether the study adds it by itself."""
+        return bool(self.like)
 
 
 @dataclass(frozen=True)
@@ -135,8 +141,12 @@ def load_study(path: str | os.PathLike[str], *, seed: int | None = None) -> Stud
             raise StudyError(f"{file}, analysis {entry.name!r}: {error}") from error
     try:
         check_headline(table, analyses)
+        report = table.report
+        if (head := headline_of(table, analyses)) is not None:
+            # What the study takes for its headline the report takes too.
+            report = report.model_copy(update={"headline": head.name})
         if (swept := damping_sweep(table, analyses)) is not None:
-            analyses.append(replace(_analysis(table, swept), implied=True))
+            analyses.append(replace(_analysis(table, swept[0]), like=swept[1]))
     except HipuqError as error:
         raise StudyError(f"{file}, report: {error}") from error
     try:
@@ -148,7 +158,7 @@ def load_study(path: str | os.PathLike[str], *, seed: int | None = None) -> Stud
     except InputError as error:
         raise StudyError(f"seed is {seed!r}: it must be an integer from 0 to 2**63 - 1") from error
     name = file.resolve().parent.name if file.name == "study.toml" else file.stem
-    return Study(name, table.title, table.description, chosen, tuple(analyses), problems, table.report, text)
+    return Study(name, table.title, table.description, chosen, tuple(analyses), problems, report, text)
 
 
 def _analysis(table: StudyFile, entry: AnalysisTable) -> Analysis:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from hipuq.comparison.record import Record
 from hipuq.errors import StoreError
 from hipuq.sampling import seed_of
 from hipuq.store import RESULTS_NAME, load_results
-from hipuq.study.analysing import BESIDE, Groups
+from hipuq.study.analysing import Groups
 from hipuq.study.differences import difference
 from hipuq.study.file import COMPARE, LITERATURE
 from hipuq.study.plan import Analysis, Study
@@ -29,13 +28,26 @@ AT_NOMINAL = ("friction_sweep", "mode_shapes")
 """Groups of an analysis that hold what the report shows at nominal values."""
 
 
+DEPENDS_ON: dict[str, tuple[str, ...]] = {
+    "friction_sweep": ("friction_sweep", "friction_points", "damping_ratio"),
+    "mode_shapes": ("mode_shapes", "shape_friction", "damping_ratio"),
+    "verdicts": (),
+    "onsets": (),
+    "frequencies": (),
+    "fragility": ("fragility_points",),
+    "friction_limit": ("targets",),
+}
+"""Group beside the results of an analysis -> keys of the report that it depends on."""
+
+
 def analysis_seed(study: Study, place: int) -> int:
     """Return the seed of the analysis at a place: one more at the end changes no other.
 
-    That of an analysis which the study adds by itself depends on its name, not on its place.
+    An analysis which the study adds by itself has that of the one that it is like: the same draws.
     """
-    analysis = study.analyses[place]
-    key = zlib.crc32(analysis.name.encode()) if analysis.implied else place
+    names = [one.name for one in study.analyses]
+    like = study.analyses[place].like
+    key = names.index(like) if like else place
     return seed_of(np.random.SeedSequence(study.seed, spawn_key=(key,)))
 
 
@@ -173,7 +185,7 @@ def _analyses(study: Study, folder: Path, tree: xr.DataTree) -> dict[str, Groups
     except (TypeError, ValueError, RecursionError):
         before = {}
     asked = definitions(study)
-    same_report = tree.attrs.get("report") == study.report.model_dump_json()
+    kept = _as_before(tree, study)
     found: dict[str, Groups] = {}
     for one in study.analyses:
         if one.name not in tree.children:
@@ -184,9 +196,24 @@ def _analyses(study: Study, folder: Path, tree: xr.DataTree) -> dict[str, Groups
         }
         _check_same(one.name, before, asked[one.name], folder)
         if set(one.of) <= set(groups):
-            wanted = {*one.of, *((*AT_NOMINAL, *BESIDE) if same_report else ())}
+            wanted = {*one.of, *kept}
             found[one.name] = {f"{one.name}/{key}": own for key, own in groups.items() if key in wanted}
     return found
+
+
+def _as_before(tree: xr.DataTree, study: Study) -> list[str]:
+    """Return the groups beside the results of analyses that the report asks for as it did before."""
+    try:
+        before = json.loads(tree.attrs.get("report", "{}"))
+        before = before if isinstance(before, dict) else {}
+    except (TypeError, ValueError, RecursionError):
+        before = {}
+    now = json.loads(study.report.model_dump_json())
+    return [
+        name
+        for name, keys in DEPENDS_ON.items()
+        if all(key in before and before[key] == now[key] for key in keys)
+    ]
 
 
 def _check_same(name: str, before: Any, asked: dict[str, Any], folder: Path) -> None:

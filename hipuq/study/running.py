@@ -15,7 +15,7 @@ from hipuq.errors import StoreError
 from hipuq.evidence import FIGURES, literature
 from hipuq.models.oscillator_ring import OscillatorRing
 from hipuq.store import RESULTS_NAME, add_results, load_results, save_results, versions
-from hipuq.study.analysing import Groups, analysed, at_nominal, beside_again
+from hipuq.study.analysing import Groups, analysed, at_nominal, derived_again
 from hipuq.study.file import LITERATURE
 from hipuq.study.plan import Study
 from hipuq.study.resuming import DEFINITIONS, Earlier, analysis_seed, definitions, earlier
@@ -78,7 +78,7 @@ def run_study(
     for i, analysis in enumerate(study.analyses):
         if analysis.name in before.analyses:
             there = before.analyses[analysis.name]
-            results.add(beside_again(analysis, study.report, folder, there))
+            results.add(derived_again(analysis, study.report, folder, there, say))
             results.add(at_nominal(analysis, study.report, n_jobs, there))
             say(f"{analysis.name}: kept, complete in {folder}")
             continue
