@@ -150,7 +150,11 @@ def test_an_analysis_over_friction_is_the_last_choice_and_a_fragility_curve():
     assert reading.analysis == "exact"
     (block,) = [one for one in blocks(reading) if one.key == "fragility"]
     assert any("at a friction of 0.02 and" in line for line in block.lines)
-    assert Reading(tree({"curve/any_unstable": over})).analysis == "curve"
+    alone = Reading(tree({"curve/any_unstable": over}))
+    assert alone.analysis is None
+    values = over["probability_overall" if "probability_overall" in over else "probability"].values
+    said = f"P(squeak) is {values.min():.3f} to {values.max():.3f} over the friction of the analysis 'curve'"
+    assert headline(alone).lines[0] == said
 
 
 @pytest.mark.parametrize(

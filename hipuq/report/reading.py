@@ -73,13 +73,12 @@ class Reading:
     def analysis(self) -> str | None:
         """The analysis whose probability is the headline; None where no analysis has one.
 
-        ``[report] headline`` if it has one, else the first, one that is swept over friction last: its
-        probability is that at one friction.
+        ``[report] headline`` if it has one, else the first; unless asked for, none that is over more than
+        damping: its probability is that at one friction, say.
         """
         some = [name for name in self.found if self.squeak(name) is not None]
-        some.sort(key=lambda name: FRICTION in self.assumed[name])
         asked = self.report.get("headline")
-        return asked if asked in some else next(iter(some), None)
+        return asked if asked in some else next((name for name in some if not self.at_one(name)), None)
 
     @property
     def results(self) -> xr.Dataset | None:

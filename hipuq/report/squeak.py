@@ -146,10 +146,11 @@ def headline(reading: Reading) -> Block:
     """
     results = reading.results
     if results is None or reading.analysis is None:
-        lines = mean_of_verdict(reading) or [
+        none = (
             "No analysis gives a probability of any unstable mode: one of any_unstable, or of probability "
             "with friction integrated, by Monte Carlo or polynomial chaos would"
-        ]
+        )
+        lines = mean_of_verdict(reading) or along(reading) or [none]
         return Block("squeak", TITLE, lines, brief=list(lines))
     long, short = rests_on(reading)
     told = assumptions(reading)
@@ -162,6 +163,35 @@ def headline(reading: Reading) -> Block:
     kept = (line for line in told if line != BY_SAMPLING)
     brief += [line for line in kept if not line.startswith(ANALYSIS) or ", since " in line]
     return Block("squeak", TITLE, [lead(results), *lines], brief=brief)
+
+
+def along(reading: Reading) -> list[str]:
+    """Return between which values P(squeak) lies in an analysis over more than damping; nothing without one.
+
+    Parameters
+    ----------
+    reading : Reading
+
+    Returns
+    -------
+    list of str
+    """
+    for name in reading.found:
+        one, parameter = reading.squeak(name), reading.at_one(name)
+        if one is None or not parameter:
+            continue
+        whole = reading.whole[name][str(one.attrs["of"])]
+        values = whole[probability_name(one)].values
+        if not np.isfinite(values).any():
+            continue
+        low, high = share(float(np.nanmin(values)), 3), share(float(np.nanmax(values)), 3)
+        called = " and ".join(key.replace("_", " ") for key in reading.assumed[name])
+        fixed = parameter.replace("_", " ")
+        return [
+            f"P(squeak) is {low} to {high} over the {called} of the analysis {name!r}",
+            f"Without a distribution of {fixed} there is no one probability: an analysis with it has one",
+        ]
+    return []
 
 
 def mean_of_verdict(reading: Reading) -> list[str]:
