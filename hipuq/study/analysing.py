@@ -142,6 +142,15 @@ DERIVED: dict[str, Callable[[Analysis, ReportTable, xr.Dataset], xr.Dataset]] = 
 """Group beside the results of an analysis -> what makes it of the outcomes, without the method."""
 
 
+NEEDS = {
+    "fragility": {"onset", "interval"},
+    "onsets": {"onset"},
+    "friction_limit": {"onset"},
+    "frequencies": {"frequency", "unstable"},
+}
+"""Group of `DERIVED` -> outcomes that it is made of."""
+
+
 def _limits_of_a_sweep(analysis: Analysis, report: ReportTable, groups: Groups) -> Groups:
     """Return the friction limits of an analysis over friction, by what else it is over."""
     curve = next((groups[of] for of in OF_ANY_MODE if of in groups), None)
@@ -189,14 +198,10 @@ def derived_again(
     stored = folder / "outcomes" / f"{analysis.name}.zarr"
     if missing and stored.exists():
         whole = load_outcomes(stored).load()
-        if {"onset", "interval"} <= set(whole.variables) or not {"onsets", "fragility"} & set(missing):
-            for name in list(missing):
-                if name == "frequencies" and "frequency" not in whole:
-                    continue
-                make = DERIVED[name]
-                parts = [make(analysis, report, one) for one in _by_value(whole, analysis)]
-                found[name] = gathered(parts, analysis.over)
-                missing.remove(name)
+        for name in [name for name in missing if NEEDS.get(name, set()) <= set(whole.variables)]:
+            parts = [DERIVED[name](analysis, report, one) for one in _by_value(whole, analysis)]
+            found[name] = gathered(parts, analysis.over)
+            missing.remove(name)
     if missing:
         say(
             f"{analysis.name}: {', '.join(missing)} cannot be made from the outcomes that are stored; run "
