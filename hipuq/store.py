@@ -113,6 +113,29 @@ def load_results(path: str | os.PathLike[str]) -> xr.DataTree:
     return tree
 
 
+def check_ours(file: Path) -> None:
+    """Raise a StoreError unless a file is one of results that hipuq wrote; values are not read.
+
+    Parameters
+    ----------
+    file : Path
+
+    Raises
+    ------
+    StoreError
+        If it cannot be read, or another program wrote it.
+    """
+    import h5netcdf
+
+    with _reported("read", file), h5netcdf.File(file, "r") as opened:
+        groups = [opened, *opened.groups.values()]
+        ours = any(
+            "hipuq_version" in one.attrs for group in groups for one in (group, *group.groups.values())
+        )
+    if not ours:
+        raise StoreError(f"{file} is not a results file of hipuq: it has no attribute hipuq_version")
+
+
 def save_outcomes(outcomes: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """Write samples or outcomes to a Zarr store; an old store stays until the new one is complete.
 

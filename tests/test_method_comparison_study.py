@@ -33,7 +33,9 @@ def small(race):
 
     Of those that are dear, the smallest alone.
     """
-    sizes = [dict(list(one.sizes.items())[: 1 if one.name in DEAR else 2]) for one in race.contenders]
+    dear = [one.name in DEAR or one.name.endswith("by pattern") for one in race.contenders]
+    few = zip(race.contenders, dear, strict=True)
+    sizes = [dict(list(one.sizes.items())[: 1 if much else 2]) for one, much in few]
     budgets = tuple(b for b in race.budgets if any(b in own for own in sizes))
     contenders = tuple(
         replace(one, sizes=own, replicates=2) for one, own in zip(race.contenders, sizes, strict=True)

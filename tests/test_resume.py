@@ -1,6 +1,7 @@
 """A study that was cut off goes on to the results of one that was not, and never mixes two definitions."""
 
 import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -75,9 +76,22 @@ def assert_same(one: xr.DataTree, other: xr.DataTree) -> None:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory) -> xr.DataTree:
+def complete(tmp_path_factory) -> tuple[Path, xr.DataTree]:
+    """Return the folder and the results of a run that nothing cut off."""
+    folder = tmp_path_factory.mktemp("whole") / "study"
+    return folder, run(folder, BOTH)
+
+
+@pytest.fixture
+def whole(complete) -> xr.DataTree:
     """Return the results of a run that nothing cut off."""
-    return run(tmp_path_factory.mktemp("whole") / "study", BOTH)
+    return complete[1]
+
+
+@pytest.fixture
+def folder(complete, tmp_path) -> Path:
+    """Return a folder of one's own with such a run in it."""
+    return Path(shutil.copytree(complete[0], tmp_path / "study"))
 
 
 def test_an_empty_folder_is_just_run(whole, tmp_path):
@@ -113,9 +127,7 @@ def test_nothing_is_evaluated_twice(monkeypatch, tmp_path):
     assert_same(again, once)
 
 
-def test_a_line_that_was_cut_off_is_done_again(whole, tmp_path):
-    folder = tmp_path / "study"
-    run(folder, BOTH)
+def test_a_line_that_was_cut_off_is_done_again(whole, folder):
     file = folder / "out" / "compare" / "hoffmann.jsonl"
     text = file.read_text(encoding="utf-8")
     file.write_text(text[: len(text) // 2], encoding="utf-8")
@@ -123,9 +135,8 @@ def test_a_line_that_was_cut_off_is_done_again(whole, tmp_path):
     assert len(file.read_text(encoding="utf-8").splitlines()) == len(text.splitlines())
 
 
-def test_more_is_added_and_what_is_gone_is_left_out(tmp_path):
-    folder = tmp_path / "study"
-    first = run(folder, BOTH)
+def test_more_is_added_and_what_is_gone_is_left_out(whole, folder):
+    first = whole
     more = BOTH.replace("budgets = [16, 32]", "budgets = [16, 32, 128]")
     more += '[[analysis]]\nname = "c"\nmethod = "monte_carlo"\nn = 8\nof = "margin"\n'
     second = run(folder, more, resume=True)
@@ -233,10 +244,8 @@ def test_runs_of_another_comparison_are_refused(tmp_path, old, new, message):
         run(folder, COMPARE.replace(old, new, 1), resume=True)
 
 
-def test_without_resume_all_is_made_anew(monkeypatch, tmp_path):
+def test_without_resume_all_is_made_anew(monkeypatch, folder, tmp_path):
     """Runs of the old seed go with the old results, so that the new ones can be resumed."""
-    folder = tmp_path / "study"
-    run(folder, BOTH)
     with monkeypatch.context() as patched, pytest.raises(Killed):
         kill_after(patched, REHEARSALS + 1)
         run(folder, BOTH, seed=9)
@@ -288,10 +297,9 @@ def test_the_command_says_how_to_go_on(monkeypatch, capsys, tmp_path):
     assert "was made with seed" in line
 
 
-def test_a_resume_that_fails_leaves_no_less_than_there_was(tmp_path):
+def test_a_resume_that_fails_leaves_no_less_than_there_was(whole, folder):
     """Old results of a comparison stay until there are new ones; what the study no longer has is told."""
-    folder = tmp_path / "study"
-    first = run(folder, BOTH)
+    first = whole
     more = BOTH.replace("budgets = [16, 32]", "budgets = [16, 32, 128]")
     with pytest.MonkeyPatch.context() as patched, pytest.raises(Killed):
         kill_after(patched, REHEARSALS)
@@ -369,9 +377,9 @@ def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
     return (code if isinstance(code, int) else int(code is not None)), said.out, said.err
 
 
-def test_a_dry_run_tells_what_would_be_kept_and_refuses_what_a_run_refuses(monkeypatch, capsys, tmp_path):
-    folder = tmp_path / "study"
-    run(folder, BOTH)
+def test_a_dry_run_tells_what_would_be_kept_and_refuses_what_a_run_refuses(
+    monkeypatch, capsys, folder, tmp_path
+):
     out = folder / "out"
     file = out / "compare" / "hoffmann.jsonl"
     lines = file.read_text(encoding="utf-8").splitlines(keepends=True)

@@ -14,7 +14,7 @@ from hipuq import __version__
 from hipuq.errors import StoreError
 from hipuq.evidence import FIGURES, literature
 from hipuq.models.oscillator_ring import OscillatorRing
-from hipuq.store import RESULTS_NAME, add_results, load_results, save_results, versions
+from hipuq.store import RESULTS_NAME, add_results, check_ours, save_results, versions
 from hipuq.study.analysing import Groups, analysed, at_nominal, derived_again
 from hipuq.study.file import LITERATURE
 from hipuq.study.plan import Study
@@ -182,7 +182,7 @@ def _check_writable(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if (folder / RESULTS_NAME).exists():
-            load_results(folder)  # raises for a file that is not ours to replace
+            check_ours(folder / RESULTS_NAME)
         probe = folder / f".hipuq-{os.getpid()}"
         probe.touch()
         probe.unlink()
