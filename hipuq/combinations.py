@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
 import numpy as np
@@ -59,7 +59,7 @@ def gathered(parts: Sequence[xr.Dataset], values: Values) -> xr.Dataset:
             raise InputError(f"{name!r} in over cannot be a parameter: results use the name")
     whole = _joined(list(parts), list(values.items()))
     for key, variable in whole.data_vars.items():
-        variable.attrs = _attributes([part[key].attrs for part in parts])
+        variable.attrs = _attributes([part[key].attrs for part in parts], values)
     first = parts[0].attrs
     text = ", ".join(f"{name} at {len(own)} values" for name, own in values.items())
     options = {OVER: {name: list(own) for name, own in values.items()}}
@@ -69,7 +69,7 @@ def gathered(parts: Sequence[xr.Dataset], values: Values) -> xr.Dataset:
     return whole.assign_attrs({OVER: json.dumps(list(values))})
 
 
-def _attributes(each: list[dict[str, Any]]) -> dict[str, Any]:
+def _attributes(each: list[dict[str, Any]], values: Values) -> dict[str, Any]:
     """Return the attributes that are alike, and those that differ as a list in `PER_VALUE`."""
     plain = [
         {key: value.tolist() if hasattr(value, "tolist") else value for key, value in own.items()}
@@ -81,7 +81,12 @@ def _attributes(each: list[dict[str, Any]]) -> dict[str, Any]:
     if not unlike:
         return alike
     told = [{key: own[key] for key in unlike if key in own} for own in plain]
-    return {**alike, PER_VALUE: json.dumps(told)}
+    return {**alike, PER_VALUE: json.dumps({"over": list(values), "attrs": _keyed(points(values), told)})}
+
+
+def _keyed(places: list[dict[str, float]], told: list[dict[str, Any]]) -> list[list[Any]]:
+    """Return what is told at each place: its values, then the attributes."""
+    return [[list(place.values()), own] for place, own in zip(places, told, strict=True)]
 
 
 def _joined(parts: list[xr.Dataset], values: list[tuple[str, tuple[float, ...]]]) -> xr.Dataset:
@@ -155,24 +160,31 @@ def at(results: xr.Dataset, **values: float) -> xr.Dataset:
         if not near.any():
             raise InputError(f"the results have no {name} {value!r}: it must be one of {there.tolist()}")
         place[name] = int(near.argmax())
-    sizes = {name: results.sizes[name] for name in names}
     left = [name for name in names if name not in values]
     found = results.isel(place)
     for variable in found.data_vars.values():
         if PER_VALUE in variable.attrs:
-            variable.attrs = _settled(variable.attrs, sizes, place)
+            variable.attrs = _settled(variable)
     attrs = {key: own for key, own in results.attrs.items() if key != OVER}
     found.attrs = attrs | ({OVER: json.dumps(left)} if left else {})
     return found
 
 
-def _settled(attrs: Mapping[str, Any], sizes: Mapping[str, int], place: Mapping[str, int]) -> dict[str, Any]:
-    """Return the attributes of a variable at a place of the sweep, which has these sizes."""
-    rest = {key: value for key, value in attrs.items() if key != PER_VALUE}
-    told = np.array([json.dumps(one) for one in json.loads(attrs[PER_VALUE])], object).reshape(
-        *sizes.values()
-    )
-    kept = told[tuple(place.get(name, slice(None)) for name in sizes)]
-    if isinstance(kept, str):
-        return {**rest, **json.loads(kept)}
-    return {**rest, PER_VALUE: json.dumps([json.loads(one) for one in kept.ravel()])}
+def _settled(variable: xr.DataArray) -> dict[str, Any]:
+    """Return the attributes of a variable at the values that its coordinates have.
+
+    What is told of values that are not there any more is left out.
+    """
+    rest = {key: value for key, value in variable.attrs.items() if key != PER_VALUE}
+    said = json.loads(variable.attrs[PER_VALUE])
+    table = {tuple(key): own for key, own in said["attrs"]}
+    if not all(name in variable.coords for name in said["over"]):
+        return rest
+    there = {name: tuple(np.atleast_1d(variable[name].values).tolist()) for name in said["over"]}
+    kept = [(place, table.get(tuple(place.values()))) for place in points(there)]
+    if any(own is None for _, own in kept):
+        return rest
+    if all(name not in variable.dims for name in said["over"]):
+        return {**rest, **(kept[0][1] or {})}
+    again = {"over": said["over"], "attrs": [[list(place.values()), own] for place, own in kept]}
+    return {**rest, PER_VALUE: json.dumps(again)}

@@ -131,13 +131,31 @@ def _of_curve(curve: xr.Dataset, targets: Array) -> tuple[list[Array], tuple[flo
         raise SchemaError("the friction limit needs the coord 'friction' of the curve")
     curve = curve.sortby("friction")
     friction = curve["friction"].values.astype(np.float64)
-    found = [_before(friction, curve[f"probability{end}"].values, targets) for end in ("", "_high", "_low")]
+    middle, low, high = (curve[f"probability{end}"].values for end in LIMITS)
+    # What is not known lies anywhere between 0 and 1.
+    low, high = np.where(np.isnan(low), 0.0, low), np.where(np.isnan(high), 1.0, high)
+    first = np.append(friction, np.inf)[_exceeded(low, targets)]
+    found = [_before(friction, middle, targets), _before(friction, high, targets), first]
     return found, (float(friction[0]), float(friction[-1])), float(curve.attrs.get("confidence", np.nan))
 
 
-def _before(friction: Array, share: Array, targets: Array) -> Array:
-    """Return the last friction before a share first exceeds each target; an unknown one may exceed it."""
+def _exceeded(share: Array, targets: Array) -> NDArray[np.intp]:
+    """Return the place where a share first exceeds each target, or is unknown; its length if never."""
     exceeded = ~(share <= targets[:, None])
-    first = exceeded.argmax(axis=1)
-    last = np.concatenate([[-np.inf], friction])[first]
-    return np.where(exceeded.any(axis=1), last, np.inf)
+    return np.where(exceeded.any(axis=1), exceeded.argmax(axis=1), share.size)
+
+
+def _before(friction: Array, share: Array, targets: Array) -> Array:
+    """Return the last friction before a share first exceeds each target; NaN where that is not known."""
+    first = _exceeded(share, targets)
+    # Before the first friction there is none, and after the last no end.
+    last = np.concatenate([[-np.inf], friction[:-1], [np.inf]])[first]
+    return np.where(np.isnan(np.append(share, 0.0)[first]), np.nan, last)
+
+
+def rounded_down(value: float, digits: int = 4) -> float:
+    """Return a number with so many digits and never above it, but for what is rounding already."""
+    if not np.isfinite(value) or value <= 0:
+        return value
+    scale = 10.0 ** (digits - 1 - int(np.floor(np.log10(value))))
+    return float(np.floor(value * scale * (1 + 1e-12)) / scale)

@@ -132,7 +132,7 @@ def graded(mean: Array, squares: Array, n: Array, confidence: float) -> tuple[Ar
     Returns
     -------
     low, high : array
-        NaN for fewer than two draws.
+        Between 0 and 1; NaN for fewer than two draws.
     """
     low, high = student(mean, squares, n, confidence)
     enough, draws = n > 1, np.maximum(n, 1.0)
@@ -153,7 +153,12 @@ def graded(mean: Array, squares: Array, n: Array, confidence: float) -> tuple[Ar
     # What never came, or always did, may be rare: that is all that so many draws tell.
     single = wilson(mean * draws, draws, confidence)
     certain = few & ((mean <= 0) | (mean >= 1))
-    return np.where(certain, single[0], low), np.where(certain, single[1], high)
+    low, high = np.where(certain, single[0], low), np.where(certain, single[1], high)
+    # Nor do values near 0 tell more than those that are 0.
+    rare = wilson(np.zeros_like(draws), draws, confidence)[1]
+    low = np.where(few, np.minimum(low, 1 - rare), low)
+    high = np.where(few, np.maximum(high, rare), high)
+    return np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
 
 
 def combined(

@@ -117,8 +117,25 @@ def test_an_unknown_probability_of_a_curve_is_not_below():
         {name: ("friction", own) for name, own in parts.items()}, {"friction": [0.1, 0.2, 0.3]}
     )
     limits = hipuq.friction_limit(curve, [0.1, 0.9])
-    assert values(limits) == [0.1, 0.1]
-    assert values(limits, "_high") == [0.2, np.inf]
+    assert np.isnan(values(limits)).all()
+    assert values(limits, "_low") == [0.1, 0.1]
+    assert values(limits, "_high") == [0.3, np.inf]
+    nothing = hipuq.friction_limit(curve * np.nan, 0.1)
+    assert np.isnan(values(nothing)).all()
+    assert [values(nothing, end) for end in ("_low", "_high")] == [[-np.inf], [np.inf]]
+
+
+def test_the_interval_of_a_curve_ends_where_it_must_be_exceeded():
+    """Between two frictions of a grid the limit may be anywhere: the upper end is the later one."""
+    probability = np.array([0.0, 0.05, 0.5, 1.0])
+    parts = {
+        "": probability,
+        "_low": np.maximum(probability - 0.02, 0),
+        "_high": np.minimum(probability + 0.02, 1),
+    }
+    data = {f"probability{end}": ("friction", own) for end, own in parts.items()}
+    limits = hipuq.friction_limit(xr.Dataset(data, {"friction": [0.0, 0.1, 0.2, 0.4]}), 0.1)
+    assert [values(limits, end) for end in ("", "_low", "_high")] == [[0.1], [0.1], [0.2]]
 
 
 @pytest.mark.parametrize("target", [1.0, -0.1, np.nan, [], [[0.1]], "abc", ["a"], 0.5j, {0.1}])

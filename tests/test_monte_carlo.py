@@ -242,3 +242,15 @@ def test_what_never_came_may_be_rare(value):
     found = hipuq.estimate("monte_carlo", outcomes, hipuq.Inputs(x=cp.Uniform(0.0, 1.0)), of="p")
     low, high = (float(found[f"probability_{end}"]) for end in ("low", "high"))
     assert [low, high] == pytest.approx([0.0, 0.1072] if value == 0 else [0.8928, 1.0], abs=1e-4)
+
+
+def test_one_value_just_above_0_tells_no_more_than_none():
+    values = np.zeros(64)
+    inputs = hipuq.Inputs(x=cp.Uniform(0.0, 1.0))
+    ends = []
+    for value in (0.0, 1e-6, 1e-3):
+        values[0] = value
+        outcomes = xr.Dataset({"p": ("sample", values.copy(), {"role": "probability", "units": "1"})})
+        ends.append(float(hipuq.estimate("monte_carlo", outcomes, inputs, of="p")["probability_high"]))
+    assert ends == sorted(ends)
+    assert ends[0] == pytest.approx(0.0566, abs=1e-3)

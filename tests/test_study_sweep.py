@@ -59,6 +59,12 @@ def test_a_study_adds_the_sweep_over_damping_by_itself(tmp_path):
     assert study.evaluations == 10 * first.evaluations
 
 
+def test_a_map_of_friction_and_damping_is_no_sweep_over_damping(tmp_path):
+    over = "over = { damping_ratio = [0.0, 0.01], friction = [0.02, 0.1] }\n"
+    text = SMALL_STUDY + SAMPLED + SAMPLED.replace('"sampled"', '"map"') + over
+    assert [one.name for one in load(tmp_path, text).analyses] == ["sampled", "map", DAMPING_SWEEP]
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -102,7 +108,7 @@ def test_the_study_and_its_report_have_one_headline(tmp_path):
     over = SAMPLED + "over = { friction = [0.02, 0.1], damping_ratio = [0.0, 0.01] }\n"
     last = SAMPLED.replace('"sampled"', '"last"')
     study = load(tmp_path, SMALL_STUDY + over + last)
-    assert study.report.headline == "last"
+    assert study.headline == "last"
     with pytest.raises(StudyError, match="which the headline's analysis 'last' is not over"):
         load(tmp_path, f"{SMALL_STUDY}{over}{last}[report]\ndamping_ratio = 0.01\n")
 
@@ -218,6 +224,7 @@ def test_it_is_resumed_as_any_other(tmp_path):
     [
         ('headline = "samplet"', "did you mean 'sampled'"),
         ('headline = "other"', "tells no probability of instability"),
+        ('headline = "map"', "is over damping_ratio and friction, so it has no one probability"),
         ("damping_ratio = 0.005", "which the headline's analysis 'sampled' is not over"),
         ("damping_ratio = -0.1", "damping_ratio"),
         ("damping_ratios = [0.02, 0.01]", "must ascend"),
@@ -230,6 +237,9 @@ def test_it_is_resumed_as_any_other(tmp_path):
 )
 def test_a_report_that_cannot_be_is_one_line(report, said, tmp_path):
     other = SAMPLED.replace('"sampled"', '"other"').replace('["unstable", "any_unstable"]', '"margin"')
+    other += (
+        SAMPLED.replace('"sampled"', '"map"') + "over = { damping_ratio = [0.0], friction = [0.1, 0.2] }\n"
+    )
     with pytest.raises(StudyError, match="report") as error:
         load(tmp_path, f"{SMALL_STUDY}{OVER}{other}[report]\n{report}\n")
     assert said in str(error.value)

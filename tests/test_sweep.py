@@ -152,6 +152,10 @@ def test_what_is_said_of_a_variable_stays_with_its_value(tmp_path, ring):
         for name in ("S1", "ST", "S1_low"):
             assert here[name].attrs == alone[name].attrs
     assert "undefined" in at(results, damping_ratio=0.5)["S1"].attrs
+    # Whatever is selected, and in whatever order.
+    turned = results.sortby("damping_ratio", ascending=False)
+    assert at(turned, damping_ratio=0.0)["S1"].attrs == at(results, damping_ratio=0.0)["S1"].attrs
+    assert "per_value" not in at(results.isel(damping_ratio=slice(1, 2)), damping_ratio=0.5)["S1"].attrs
     assert "undefined" not in at(results, damping_ratio=0.0)["S1"].attrs
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import SchemaError
+from hipuq.friction_limits import rounded_down
 from hipuq.plots.captions import level
 from hipuq.plots.fragility_curves import finish
 from hipuq.plots.style import (
@@ -113,9 +114,9 @@ def _draw_limits(ax: Axes, limits: xr.Dataset, end: float) -> None:
             text = f"{percent}: not exceeded up to friction {last:.4g}"
             ax.scatter([], [], facecolors="none", edgecolors="none", label=text)
             continue
-        text = f"{percent}: not exceeded up to friction {at:.4g}"
+        text = f"{percent}: not exceeded up to friction {_down(at)}"
         if low < high:
-            ends = "start" if np.isneginf(low) else f"{low:.4g}", "end" if np.isinf(high) else f"{high:.4g}"
+            ends = "start" if np.isneginf(low) else _down(low), "end" if np.isinf(high) else _down(high)
             text += f" ({level(limits)}: {ends[0]} to {ends[1]})"
         start, stop = max(low, first), min(high, max(end, last))
         line: dict[str, Any] = {"color": VERMILLION, "zorder": 3}
@@ -124,6 +125,11 @@ def _draw_limits(ax: Axes, limits: xr.Dataset, end: float) -> None:
         style: dict[str, Any] = {"facecolors": "white", "edgecolors": VERMILLION, "linewidths": 1.2}
         marker = LIMIT_MARKERS[i % len(LIMIT_MARKERS)]
         ax.scatter(at, 100 * target, s=30, marker=marker, zorder=3.1, label=text, **style)
+
+
+def _down(value: float) -> str:
+    """Return a friction limit with four digits, never rounded up."""
+    return f"{rounded_down(value):.4g}"
 
 
 def _weights(outcomes: xr.Dataset) -> NDArray[np.float64]:

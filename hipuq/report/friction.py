@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from hipuq import schema
+from hipuq.friction_limits import rounded_down as rounded_down
 from hipuq.report.block import Block
 from hipuq.report.parts import origin
 from hipuq.report.reading import FRICTION, Reading
@@ -237,14 +238,6 @@ def limit_words(reading: Reading, analysis: str, limits: xr.Dataset) -> list[str
         sure = "" if exact else f"With {level:g} % confidence (two-sided interval): "
         lines.insert(0, sentence(f"{sure}{'; '.join(kept)} of the configurations are unstable"))
     return lines
-
-
-def rounded_down(value: float, digits: int = 4) -> float:
-    """Return a number with so many digits and never above it, but for what is rounding already."""
-    if not np.isfinite(value) or value <= 0:
-        return value
-    scale = 10.0 ** (digits - 1 - int(np.floor(np.log10(value))))
-    return float(np.floor(value * scale * (1 + 1e-12)) / scale)
 
 
 def _limit(value: float) -> str:

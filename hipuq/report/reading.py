@@ -77,8 +77,10 @@ class Reading:
         damping: its probability is that at one friction, say.
         """
         some = [name for name in self.found if self.squeak(name) is not None]
-        asked = self.report.get("headline")
-        return asked if asked in some else next((name for name in some if not self.at_one(name)), None)
+        for named in (self.report.get("headline"), self.tree.attrs.get("headline")):
+            if named in some:
+                return str(named)
+        return next((name for name in some if not self.at_one(name)), None)
 
     @property
     def results(self) -> xr.Dataset | None:

@@ -72,6 +72,11 @@ def check_headline(table: StudyFile, analyses: Sequence[Analysis]) -> None:
             f"headline {found.name!r} tells no probability of instability: it needs the method "
             f"{' or '.join(WITH_PROBABILITY)} with {' or '.join(OF_ANY_MODE)} in of"
         )
+    if report.headline is not None and found is not None and not set(found.over) <= {DAMPING}:
+        raise InputError(
+            f"headline {found.name!r} is over {' and '.join(found.over)}, so it has no one probability: "
+            f"name an analysis over {DAMPING} alone, or over nothing"
+        )
     if report.damping_ratio is None:
         return
     values = () if found is None else found.over.get(DAMPING, ())
@@ -103,7 +108,8 @@ def damping_sweep(table: StudyFile, analyses: Sequence[Analysis]) -> tuple[Analy
     found = headline_of(table, analyses) or next(iter(analyses), None)
     if found is None or not table.report.damping_samples or DAMPING not in found.model.parameters:
         return None
-    if any(one.name == DAMPING_SWEEP or DAMPING in one.over or DAMPING in one.inputs for one in analyses):
+    told = (set(one.over) == {DAMPING} and _tells(one) for one in analyses)
+    if any(told) or any(one.name == DAMPING_SWEEP or DAMPING in one.inputs for one in analyses):
         return None
     entry = next(one for one in table.analysis if one.name == found.name)
     if not (entry.integrate_friction or FRICTION in found.inputs) or found.over:

@@ -92,6 +92,8 @@ class Study:
         What figures show.
     text : str
         The study file as it was read.
+    headline : str or None
+        Analysis whose probability is told first, whether asked for or found.
     """
 
     name: str
@@ -102,6 +104,7 @@ class Study:
     problems: tuple[Problem, ...]
     report: ReportTable
     text: str
+    headline: str | None = None
 
     @property
     def evaluations(self) -> int:
@@ -141,10 +144,8 @@ def load_study(path: str | os.PathLike[str], *, seed: int | None = None) -> Stud
             raise StudyError(f"{file}, analysis {entry.name!r}: {error}") from error
     try:
         check_headline(table, analyses)
-        report = table.report
-        if (head := headline_of(table, analyses)) is not None:
-            # What the study takes for its headline the report takes too.
-            report = report.model_copy(update={"headline": head.name})
+        # What the study takes for its headline the report takes too.
+        head = headline_of(table, analyses)
         if (swept := damping_sweep(table, analyses)) is not None:
             analyses.append(replace(_analysis(table, swept[0]), like=swept[1]))
     except HipuqError as error:
@@ -158,7 +159,17 @@ def load_study(path: str | os.PathLike[str], *, seed: int | None = None) -> Stud
     except InputError as error:
         raise StudyError(f"seed is {seed!r}: it must be an integer from 0 to 2**63 - 1") from error
     name = file.resolve().parent.name if file.name == "study.toml" else file.stem
-    return Study(name, table.title, table.description, chosen, tuple(analyses), problems, report, text)
+    return Study(
+        name,
+        table.title,
+        table.description,
+        chosen,
+        tuple(analyses),
+        problems,
+        table.report,
+        text,
+        None if head is None else head.name,
+    )
 
 
 def _analysis(table: StudyFile, entry: AnalysisTable) -> Analysis:

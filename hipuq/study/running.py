@@ -157,6 +157,7 @@ def _root(study: Study) -> Groups:
         "seed": study.seed,
         "report": study.report.model_dump_json(),
         "study_file": study.text,
+        "headline": study.headline or "",
         "command": f"hipuq run {study.name} --seed {study.seed}",
         "sources": json.dumps({one.name: dict(one.sources) for one in study.analyses}),
         "versions": json.dumps(versions()),
