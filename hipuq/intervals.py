@@ -121,7 +121,8 @@ def graded(mean: Array, squares: Array, n: Array, confidence: float) -> tuple[Ar
     The t interval, where enough draws carry the mean. Where they are few it is far too narrow: of values
     that are 0 in 91 % and uniform to 0.2 else its 95 % limits hold in 30 % (4 draws), 69 % (16), 83 % (32),
     90 % (64). There it is widened to the score interval of as many draws of 0 and 1 as have the variance
-    of the mean, so that it holds in 99, 96, 94 and 96 %, and where all values are 0, or all 1, to Wilson's.
+    of the mean, and to Wilson's where all values are 0, or all 1: what was not drawn may be like nothing that
+    was. So it holds in 99 % and more there.
 
     Parameters
     ----------
