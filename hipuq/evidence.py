@@ -16,6 +16,9 @@ import xarray as xr
 from hipuq import schema
 from hipuq.errors import check_name
 
+LITERATURE = "literature"
+"""Group of what is published, in the results of a study; no analysis may have its name."""
+
 NAN = float("nan")
 
 

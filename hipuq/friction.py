@@ -38,6 +38,9 @@ FRICTION = "friction"
 INTEGRATED_OUTCOME = {"any_unstable": "probability", "unstable": "probability_by_mode"}
 """Outcome that is sampled -> the one that gives its probability with friction integrated."""
 
+OF_ANY_MODE = ("any_unstable", INTEGRATED_OUTCOME["any_unstable"])
+"""Outcomes whose probability is that of any unstable mode: sampled, and with friction integrated."""
+
 
 def integrate_friction(model: CEAModel, distribution: object) -> FrictionIntegrated:
     """Return the model with friction integrated over its distribution.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import SchemaError
+from hipuq.fragility_curve import weights_of
 from hipuq.friction_limits import rounded_down
 from hipuq.plots.captions import level
 from hipuq.plots.fragility_curves import finish
@@ -68,7 +69,7 @@ def onset_distribution(
         raise SchemaError(
             f"onset is -inf in sample {int(np.isneginf(onset).argmax())}: no friction is so low"
         )
-    weight = _weights(outcomes)
+    weight = weights_of(outcomes)
     unknown, never = np.isnan(onset), np.isposinf(onset)
     swept = _swept(values, limits)
     friction, below = _steps(onset, weight, swept)
@@ -130,16 +131,6 @@ def _draw_limits(ax: Axes, limits: xr.Dataset, end: float) -> None:
 def _down(value: float) -> str:
     """Return a friction limit with four digits, never rounded up."""
     return f"{rounded_down(value):.4g}"
-
-
-def _weights(outcomes: xr.Dataset) -> NDArray[np.float64]:
-    """Return the weight of each sample; all together 1."""
-    size = outcomes.sizes["sample"]
-    if "weight" not in outcomes.coords:
-        return np.full(size, 1 / size)
-    # Strata of equal size: that of its level is the weight of a sample up to a common factor.
-    weight = outcomes["weight"].values.astype(np.float64)
-    return np.asarray(weight / weight.sum())
 
 
 def _swept(onset: xr.DataArray, limits: xr.Dataset | None) -> tuple[float, float] | None:

@@ -10,13 +10,15 @@ import xarray as xr
 
 from hipuq.distributions import Distribution, from_description
 from hipuq.errors import HipuqError
+from hipuq.evidence import LITERATURE
+from hipuq.friction import FRICTION
 from hipuq.report.block import Block
 from hipuq.report.damping import at_damping
 from hipuq.report.frequency import between
 from hipuq.report.friction import censored, group, onset_quantiles, range_of
 from hipuq.report.parts import frequencies
-from hipuq.report.reading import FRICTION, Reading, probability_name
-from hipuq.report.summary import LITERATURE, integrated
+from hipuq.report.reading import Reading, probability_name
+from hipuq.report.summary import integrated
 from hipuq.report.table import MISSING, Table, factor, number, percent, sentence
 
 TITLE = "Beside the clinic and the bench"

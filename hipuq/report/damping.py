@@ -11,8 +11,9 @@ import xarray as xr
 
 from hipuq import schema
 from hipuq.errors import HipuqError
+from hipuq.friction import FRICTION
 from hipuq.models import MODELS, CEAModel
-from hipuq.report.reading import DAMPING, FRICTION, model_options, nominal_of
+from hipuq.report.reading import DAMPING, model_options, nominal_of
 from hipuq.report.summary import distribution_text
 from hipuq.report.table import listed
 

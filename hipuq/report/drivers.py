@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import xarray as xr
 
+from hipuq.friction import OF_ANY_MODE
 from hipuq.report import surrogate
 from hipuq.report.block import Block
 from hipuq.report.damping import at_damping
-from hipuq.report.reading import SQUEAK, Reading
+from hipuq.report.reading import Reading
 from hipuq.report.sensitivity import has_indices, in_words, note, tables
 from hipuq.report.summary import integrated
 
-OUTCOMES = (*SQUEAK, "margin")
+OUTCOMES = (*OF_ANY_MODE, "margin")
 """Outcomes whose indices are told, the most telling first."""
 
 TITLE = "What drives it"
@@ -29,7 +30,9 @@ def driving(reading: Reading) -> tuple[str, str, xr.Dataset] | None:
             if results is None or not has_indices(results) or results["ST"].dims != ("parameter",):
                 continue
             open_ = bool((results["S1"].isnull() | results["ST"].isnull()).all())
-            found.append((bool(surrogate.distrust(results)) or open_, rank // len(SQUEAK), name, of, results))
+            found.append(
+                (bool(surrogate.distrust(results)) or open_, rank // len(OF_ANY_MODE), name, of, results)
+            )
     if not found:
         return None
     _, _, name, of, results = min(found, key=lambda one: one[:2])
@@ -62,7 +65,7 @@ def drivers(reading: Reading) -> Block:
         lines.append(
             "Friction is integrated there: it has no index, the others are of the probability over friction"
         )
-    if of not in SQUEAK:
+    if of not in OF_ANY_MODE:
         lines.append(
             "They are those of the margin, not of the verdict: what moves it most need not decide most often"
         )

@@ -6,10 +6,12 @@ import numpy as np
 import xarray as xr
 
 from hipuq import schema
+from hipuq.fragility_curve import weights_of
+from hipuq.friction import FRICTION
 from hipuq.friction_limits import rounded_down as rounded_down
 from hipuq.report.block import Block
 from hipuq.report.parts import origin
-from hipuq.report.reading import FRICTION, Reading
+from hipuq.report.reading import Reading
 from hipuq.report.table import Table, number, plain, sentence, significant
 
 FRAGILITY_TITLE = "Fragility: P(squeak) at each friction, and the onsets"
@@ -99,7 +101,7 @@ def onset_words(onsets: xr.Dataset) -> list[str]:
             f"{low}, its median {median}, its 95 % quantile {high}"
         )
     lower, upper = range_of(onsets)
-    start = float(_weight(onsets)[onsets["onset"].values <= lower].sum())
+    start = float(weights_of(onsets)[onsets["onset"].values <= lower].sum())
     if start:
         lines.append(
             f"{100 * start:.3g} % of the configurations are unstable from the start of the range, {lower:g}: "
@@ -132,14 +134,6 @@ def placed(onset: float, onsets: xr.Dataset) -> str:
     return f"at or below {lower:g}" if onset <= lower else number(onset)
 
 
-def _weight(onsets: xr.Dataset) -> np.ndarray:
-    """Return the weights of the samples; all together 1."""
-    weight = np.ones(onsets["onset"].shape)
-    if "weight" in onsets.coords:
-        weight = onsets["weight"].values.astype(np.float64)
-    return np.asarray(weight / weight.sum())
-
-
 def onset_quantiles(onsets: xr.Dataset) -> tuple[np.ndarray, float, float] | None:
     """Return the 5, 50 and 95 % quantiles of the known onsets, what has none, what is unknown.
 
@@ -151,7 +145,7 @@ def onset_quantiles(onsets: xr.Dataset) -> tuple[np.ndarray, float, float] | Non
         Shares of the weight.
     """
     onset = onsets["onset"].values.astype(np.float64)
-    weight = _weight(onsets)
+    weight = weights_of(onsets)
     known = ~np.isnan(onset)
     if not known.any():
         return None

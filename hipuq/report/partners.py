@@ -10,12 +10,9 @@ import numpy as np
 import xarray as xr
 
 from hipuq import schema
-from hipuq.friction import INTEGRATED_OUTCOME
+from hipuq.friction import INTEGRATED_OUTCOME, OF_ANY_MODE
 from hipuq.report.summary import analyses
 from hipuq.schema import is_exact
-
-INTEGRATED_OUTCOME_OF_ANY = ("any_unstable", INTEGRATED_OUTCOME["any_unstable"])
-"""Outcomes of any unstable mode: sampled, and with friction integrated."""
 
 Found = Mapping[str, Mapping[str, xr.Dataset]]
 """Analysis -> name of a group -> its Dataset."""
@@ -160,7 +157,7 @@ def pairs_of(found: Found) -> list[tuple[str, str, xr.Dataset, xr.Dataset]]:
     """
     sampled, other = (
         [(name, groups[of]) for name, groups in found.items() if of in groups and _one(groups[of])]
-        for of in INTEGRATED_OUTCOME_OF_ANY
+        for of in OF_ANY_MODE
     )
     return [
         (name, partner, one, two)

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from hipuq.friction import OF_ANY_MODE
 from hipuq.report import chance
 from hipuq.report.block import Block, turned
 from hipuq.report.damping import at_damping
 from hipuq.report.frequency import between, decimals, unit_of, written
 from hipuq.report.over_damping import cell
 from hipuq.report.partners import summed_up
-from hipuq.report.reading import SQUEAK, Reading
+from hipuq.report.reading import Reading
 from hipuq.report.summary import group_table, limits_word, modes_shown
 from hipuq.report.table import MISSING, Table, plain
 
@@ -39,7 +40,7 @@ def origin(reading: Reading, analysis: str, results: xr.Dataset) -> list[str]:
 def counted(reading: Reading) -> tuple[str, xr.Dataset] | None:
     """Return the analysis that tells the probability by number in contact, and its results; None without."""
     for name in reading.ranked:
-        for of in SQUEAK:
+        for of in OF_ANY_MODE:
             results = reading.found[name].get(of)
             if summed_up(results, {"count"}):
                 return name, results

@@ -11,13 +11,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from hipuq.friction import FRICTION, OF_ANY_MODE
 from hipuq.report.partners import case_of, groups_of
 from hipuq.sweeping import at, swept
 
-SQUEAK = ("any_unstable", "probability")
-"""Outcomes whose probability is that of any unstable mode: sampled, and with friction integrated."""
-
-DAMPING, FRICTION = "damping_ratio", "friction"
+DAMPING = "damping_ratio"
 
 Groups = Mapping[str, xr.Dataset]
 
@@ -89,7 +87,7 @@ class Reading:
 
     def squeak(self, analysis: str) -> xr.Dataset | None:
         """Return the results of an analysis that hold one probability of any unstable mode."""
-        for of in SQUEAK:
+        for of in OF_ANY_MODE:
             results = self.found[analysis].get(of)
             if results is not None and "of" in results.attrs and probability_name(results):
                 return results

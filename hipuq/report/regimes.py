@@ -9,8 +9,9 @@ from typing import Any
 import xarray as xr
 
 from hipuq.distributions import regimes
+from hipuq.friction import FRICTION
 from hipuq.report.partners import case_of
-from hipuq.report.reading import FRICTION, Reading, probability_name
+from hipuq.report.reading import Reading, probability_name
 from hipuq.report.summary import integrated
 from hipuq.report.table import listed, number, share
 

@@ -8,10 +8,11 @@ import numpy as np
 import xarray as xr
 
 from hipuq import schema
+from hipuq.friction import OF_ANY_MODE
 from hipuq.methods import METHODS
 from hipuq.report.block import Block
 from hipuq.report.damping import NONE, at_damping, damping_words, label, percent_of
-from hipuq.report.reading import DAMPING, SQUEAK, Reading, model_options, nominal_of, probability_name
+from hipuq.report.reading import DAMPING, Reading, model_options, nominal_of, probability_name
 from hipuq.report.regimes import rests_on
 from hipuq.report.summary import integrated
 from hipuq.report.table import fitting, number, share
@@ -207,7 +208,7 @@ def mean_of_verdict(reading: Reading) -> list[str]:
         The mean with its interval, if it has one, and what would give one; nothing without a mean.
     """
     for name, groups in reading.found.items():
-        for of in SQUEAK:
+        for of in OF_ANY_MODE:
             results = groups.get(of)
             if results is None or reading.at_one(name):
                 continue

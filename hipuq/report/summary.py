@@ -13,6 +13,7 @@ import xarray as xr
 from hipuq import schema
 from hipuq.distributions import described
 from hipuq.errors import SchemaError
+from hipuq.evidence import LITERATURE
 from hipuq.report import sensitivity
 from hipuq.report.table import Table, mode_label, number, sentence, share
 
@@ -24,9 +25,6 @@ STUDY_ATTRS = ("title", "description", "study", "seed", "report", "study_file", 
 
 COMPARE = "compare"
 """Group of a results tree that holds the comparisons of methods."""
-
-LITERATURE = "literature"
-"""Group of a results tree that holds what was reported and measured elsewhere."""
 
 
 def analyses(tree: xr.DataTree) -> list[str]:

@@ -8,6 +8,7 @@ from rich.markup import escape
 
 from hipuq import schema
 from hipuq.errors import check_name
+from hipuq.friction import OF_ANY_MODE
 from hipuq.report import comparison as methods
 from hipuq.report.comparison_error import error_table
 from hipuq.report.damping import damping_words, label
@@ -15,7 +16,7 @@ from hipuq.report.first_part import blocks
 from hipuq.report.over_damping import cell, ends
 from hipuq.report.partners import comparison
 from hipuq.report.printing import printed
-from hipuq.report.reading import DAMPING, SQUEAK, Reading, probability_name
+from hipuq.report.reading import DAMPING, Reading, probability_name
 from hipuq.report.sensitivity import has_indices, remarks
 from hipuq.report.summary import comparisons, estimates, headline, integrated, tables, trust
 from hipuq.report.sweeps import assumed_words, sweep_table
@@ -113,7 +114,7 @@ def _bare(results: xr.Dataset) -> str:
 def _short(results: xr.Dataset, of: str) -> str:
     """Return the result of an analysis in a few words."""
     if name := probability_name(results):
-        return f"{'P' if of in SQUEAK else f'P of {of}'} {cell(results, name)}"
+        return f"{'P' if of in OF_ANY_MODE else f'P of {of}'} {cell(results, name)}"
     if has_indices(results):
         return f"indices of {of}"
     return of

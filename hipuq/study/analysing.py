@@ -14,12 +14,12 @@ from hipuq.combinations import at, gathered, points
 from hipuq.driver import completed, estimated, method_named
 from hipuq.evaluation import evaluate, together
 from hipuq.fragility_curve import fragility
-from hipuq.friction import FrictionIntegrated
+from hipuq.friction import FRICTION, OF_ANY_MODE, FrictionIntegrated
 from hipuq.friction_limits import friction_limit
 from hipuq.models import CEAModel
 from hipuq.occurring import frequency_ranges, verdict_counts
 from hipuq.store import load_outcomes, save_outcomes
-from hipuq.study.headline import DAMPING, FRICTION, OF_ANY_MODE
+from hipuq.study.headline import DAMPING
 from hipuq.study.plan import Analysis
 from hipuq.study.tables import ReportTable
 

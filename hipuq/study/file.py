@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from hipuq.errors import StudyError, unknown_name
+from hipuq.evidence import LITERATURE
 from hipuq.study.compare_tables import (
     CompareTable,
     ContenderTable,
@@ -22,9 +23,6 @@ MAXIMUM_BYTES = 1_000_000
 
 COMPARE = "compare"
 """Group of the comparisons in the results; no analysis may have its name."""
-
-LITERATURE = "literature"
-"""Group of what is published, in the results; no analysis may have its name."""
 
 
 class StudyFile(Table):

@@ -6,19 +6,17 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from hipuq.errors import InputError, check_name
+from hipuq.friction import FRICTION, OF_ANY_MODE
 from hipuq.study.file import StudyFile
 from hipuq.study.tables import AnalysisTable
 
 if TYPE_CHECKING:
     from hipuq.study.plan import Analysis
 
-DAMPING, FRICTION = "damping_ratio", "friction"
+DAMPING = "damping_ratio"
 
 DAMPING_SWEEP = "damping_sweep"
 """Name of the analysis over the damping ratio that a study adds by itself."""
-
-OF_ANY_MODE = ("any_unstable", "probability")
-"""Outcomes whose probability is that of instability as a whole."""
 
 
 WITH_PROBABILITY = ("monte_carlo", "chaos")

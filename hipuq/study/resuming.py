@@ -13,11 +13,12 @@ import xarray as xr
 from hipuq import __version__
 from hipuq.comparison.record import Record
 from hipuq.errors import StoreError
+from hipuq.evidence import LITERATURE
 from hipuq.sampling import seed_of
 from hipuq.store import RESULTS_NAME, load_results
 from hipuq.study.analysing import Groups
 from hipuq.study.differences import difference
-from hipuq.study.file import COMPARE, LITERATURE
+from hipuq.study.file import COMPARE
 from hipuq.study.plan import Analysis, Study
 from hipuq.study.problems import Problem
 

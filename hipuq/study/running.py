@@ -12,11 +12,10 @@ import xarray as xr
 
 from hipuq import __version__
 from hipuq.errors import StoreError
-from hipuq.evidence import FIGURES, literature
+from hipuq.evidence import FIGURES, LITERATURE, literature
 from hipuq.models.oscillator_ring import OscillatorRing
 from hipuq.store import RESULTS_NAME, add_results, check_ours, save_results, versions
 from hipuq.study.analysing import Groups, analysed, at_nominal, derived_again
-from hipuq.study.file import LITERATURE
 from hipuq.study.plan import Study
 from hipuq.study.resuming import DEFINITIONS, Earlier, analysis_seed, definitions, earlier
 
