@@ -1,0 +1,78 @@
+"""Outcomes in Zarr stores; nothing in them is ever unpickled."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import xarray as xr
+
+from hipuq.errors import StoreError
+from hipuq.store.reporting import reported
+
+
+def save_outcomes(outcomes: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write samples or outcomes to a Zarr store; an old store stays until the new one is complete.
+
+    Parameters
+    ----------
+    outcomes : Dataset
+    path : path
+        Folder to write; only a Zarr store or nothing is replaced.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written, or something else is there.
+    """
+    folder = Path(path)
+    part, old = (folder.with_name(f".{folder.name}.hipuq-{end}") for end in ("part", "old"))
+    with reported("write", folder):
+        if folder.exists() and not _is_store(folder):
+            raise StoreError(f"cannot write {folder}: something that is not a Zarr store is there")
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        # A process that was killed may have left half of them.
+        for half in (part, old):
+            if half.exists():
+                shutil.rmtree(half)
+        # Version 2 of the format: version 3 has no settled strings yet.
+        outcomes.drop_encoding().to_zarr(part, mode="w", zarr_format=2, consolidated=True)
+        if folder.exists():
+            folder.rename(old)
+        part.rename(folder)
+        if old.exists():
+            shutil.rmtree(old)
+
+
+def load_outcomes(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Open samples or outcomes; values are read when they are used.
+
+    Parameters
+    ----------
+    path : path
+        Folder that `save_outcomes` wrote.
+
+    Returns
+    -------
+    Dataset
+        Identical to what was saved.
+
+    Raises
+    ------
+    StoreError
+        If there is no such store, it cannot be read, or hipuq did not write it.
+    """
+    folder = Path(path)
+    if not _is_store(folder):
+        raise StoreError(f"there are no outcomes at {folder}: it is not a Zarr store")
+    with reported("read", folder):
+        outcomes = xr.open_zarr(folder, chunks=None, consolidated=True)
+    if "hipuq_version" not in outcomes.attrs:
+        raise StoreError(f"{folder} is not a store of hipuq: it has no attribute hipuq_version")
+    found: xr.Dataset = outcomes.drop_encoding()
+    return found
+
+
+def _is_store(folder: Path) -> bool:
+    return (folder / ".zgroup").is_file() or (folder / "zarr.json").is_file()

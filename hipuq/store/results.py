@@ -1,0 +1,121 @@
+"""Results in netCDF; nothing in them is ever unpickled."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+
+import xarray as xr
+
+from hipuq.errors import StoreError
+from hipuq.store.reporting import reported
+
+RESULTS_NAME = "results.nc"
+"""Name of the results file in an output folder."""
+
+
+def save_results(results: xr.DataTree | xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write results to a netCDF file; an old file stays until the new one is complete.
+
+    Parameters
+    ----------
+    results : DataTree or Dataset
+    path : path
+        File to write; its folder is made.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written.
+    """
+    file = Path(path)
+    tree = results if isinstance(results, xr.DataTree) else xr.DataTree(results)
+    part = file.with_name(file.name + ".part")
+    with reported("write", file):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        tree.to_netcdf(part, engine="h5netcdf")
+        part.replace(file)
+
+
+def add_results(groups: Mapping[str, xr.Dataset], path: str | os.PathLike[str]) -> None:
+    """Add groups to a results file; the old file stays until the new one is complete.
+
+    Parameters
+    ----------
+    groups : mapping of Dataset
+        By name, such as ``"printed/any_unstable"``; none that the file has already.
+    path : path
+        A file that `save_results` wrote.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be read or written.
+    """
+    file = Path(path)
+    part = file.with_name(file.name + ".part")
+    with reported("write", file):
+        shutil.copyfile(file, part)
+        for name, dataset in groups.items():
+            dataset.to_netcdf(part, mode="a", group=name, engine="h5netcdf")
+        part.replace(file)
+
+
+def load_results(path: str | os.PathLike[str]) -> xr.DataTree:
+    """Read results into memory.
+
+    Parameters
+    ----------
+    path : path
+        A results file, or the output folder that holds it.
+
+    Returns
+    -------
+    DataTree
+        Groups ``<analysis>/<of>``, identical to what was saved.
+
+    Raises
+    ------
+    StoreError
+        If there is no such file, it cannot be read, or hipuq did not write it.
+    """
+    file = Path(path)
+    if file.is_dir():
+        file = file / RESULTS_NAME
+    if not file.exists():
+        raise StoreError(
+            f"there are no results at {file}: give an output folder of hipuq run, or its {RESULTS_NAME}"
+        )
+    with reported("read", file), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of files that are not netCDF, refused below
+        with xr.open_datatree(file, engine="h5netcdf") as opened:
+            tree = opened.load().copy()
+    if not any("hipuq_version" in node.attrs for node in tree.subtree):
+        raise StoreError(f"{file} is not a results file of hipuq: it has no attribute hipuq_version")
+    return tree
+
+
+def check_ours(file: Path) -> None:
+    """Raise a StoreError unless a file is one of results that hipuq wrote; values are not read.
+
+    Parameters
+    ----------
+    file : Path
+
+    Raises
+    ------
+    StoreError
+        If it cannot be read, or another program wrote it.
+    """
+    import h5netcdf
+
+    with reported("read", file), h5netcdf.File(file, "r") as opened:
+        groups = [opened, *opened.groups.values()]
+        ours = any(
+            "hipuq_version" in one.attrs for group in groups for one in (group, *group.groups.values())
+        )
+    if not ours:
+        raise StoreError(f"{file} is not a results file of hipuq: it has no attribute hipuq_version")
