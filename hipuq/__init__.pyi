@@ -7,6 +7,7 @@ from .distributions import lubrication as lubrication
 from .distributions import mixture as mixture
 from .driver import design as design
 from .driver import estimate as estimate
+from .driver import lazy_design as lazy_design
 from .driver import run as run
 from .errors import HipuqError as HipuqError
 from .evaluation import evaluate as evaluate

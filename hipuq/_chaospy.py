@@ -9,7 +9,8 @@ from __future__ import annotations
 import ast
 import logging
 import sys
-from functools import lru_cache
+import warnings
+from functools import cache, lru_cache
 from types import ModuleType
 from typing import Any
 
@@ -19,6 +20,15 @@ from numpy.typing import NDArray
 from hipuq.errors import InputError, unknown_name
 
 Array = NDArray[np.float64]
+
+LEVELS_MAXIMUM = 1_000_000
+"""Most levels of a discrete distribution, which are written out to invert it."""
+
+_NOT_DESCRIBED = (
+    *("Distribution", "Iid", "UserDistribution"),
+    *("ScipyStatsDist", "OpenTURNSDist", "openturns_dist"),
+)
+"""Distributions of chaospy that are made of functions and objects, or of any number of copies."""
 
 
 def load() -> ModuleType:
@@ -59,8 +69,10 @@ def ppf(distribution: Any, u: Array) -> Array:
     """Return the quantiles at `u`, any shape, levels for a discrete distribution."""
     if distribution.interpret_as_integer:
         lower, upper = support(distribution)
+        if not upper - lower < LEVELS_MAXIMUM:
+            raise ValueError(f"it has more than {LEVELS_MAXIMUM:,} levels, from {lower:g} to {upper:g}")
         levels = np.arange(lower, upper + 1)
-        cumulative = np.asarray(distribution.cdf(levels), dtype=np.float64)
+        cumulative = _cumulative(distribution, levels)
         cumulative[-1] = 1.0
         found: Array = levels[np.searchsorted(cumulative, u, side="left").clip(0, len(levels) - 1)]
         return found
@@ -68,12 +80,19 @@ def ppf(distribution: Any, u: Array) -> Array:
     return flat.reshape(np.shape(u))
 
 
+def _cumulative(distribution: Any, x: Array) -> Array:
+    with warnings.catch_warnings():
+        # Of the whole number of trials of a binomial distribution, which chaospy gives scipy as a float.
+        warnings.filterwarnings("ignore", "non-integer arg n", DeprecationWarning)
+        return np.asarray(distribution.cdf(x), dtype=np.float64)
+
+
 def adds_up(distribution: Any) -> bool:
     """Say whether the cumulative probability reaches 1 at the upper end.
 
     That of ``Trunc`` with both ends does not in chaospy 4.3, and its quantiles are as wrong.
     """
-    return bool(abs(float(distribution.cdf(distribution.upper)[0]) - 1) < 1e-9)
+    return bool(abs(float(_cumulative(distribution, distribution.upper)[0]) - 1) < 1e-9)
 
 
 def cdf(distribution: Any, x: Array) -> Array:
@@ -81,7 +100,7 @@ def cdf(distribution: Any, x: Array) -> Array:
     at = np.floor(x) if distribution.interpret_as_integer else np.asarray(x, dtype=np.float64)
     # Outside its support chaospy's formulas can give NaN.
     lower, upper = support(distribution)
-    flat = np.asarray(distribution.cdf(np.ravel(at.clip(lower, upper))), dtype=np.float64)
+    flat = _cumulative(distribution, np.ravel(at.clip(lower, upper)))
     inside = flat.reshape(np.shape(x))
     return np.where(at < lower, 0.0, np.where(at >= upper, 1.0, inside))
 
@@ -142,33 +161,40 @@ def from_dict(data: dict[str, Any]) -> Any:
     UnknownNameError
         If chaospy has no such distribution.
     InputError
-        If it does not take these arguments.
+        If it is no description, or the distribution does not take the arguments.
     """
-    chaospy = load()
-    name = data["name"]
-    cls = getattr(chaospy, name, None)
-    if not (isinstance(cls, type) and issubclass(cls, chaospy.Distribution)):
+    if not isinstance(data, dict) or not isinstance(data.get("name"), str):
+        raise InputError(f"not a description of a chaospy distribution: {str(data)[:60]}")
+    chaospy, name = load(), data["name"]
+    if name not in names():
         raise unknown_name("chaospy distribution", name, names())
+    arguments = [_argument(value) for value in data.get("args", ())]
+    keywords = {key: _argument(value) for key, value in data.get("kwargs", {}).items()}
     try:
-        return cls(
-            *(_argument(arg) for arg in data.get("args", ())),
-            **{key: _argument(value) for key, value in data.get("kwargs", {}).items()},
-        )
-    except (TypeError, ValueError, AssertionError) as error:
+        return getattr(chaospy, name)(*arguments, **keywords)
+    except (TypeError, ValueError, AssertionError, ArithmeticError, LookupError, AttributeError) as error:
         raise InputError(f"chaospy.{name} does not take these arguments: {error}") from error
 
 
 def _argument(value: Any) -> Any:
-    return from_dict(value) if isinstance(value, dict) else value
+    """Return a number, a list of them or a distribution from its description; no other thing is in one."""
+    if isinstance(value, dict):
+        return from_dict(value)
+    if isinstance(value, list):
+        return [_argument(one) for one in value]
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return value
+    raise InputError(f"an argument of a chaospy distribution is {str(value)[:60]!r}: it must be a number")
 
 
+@cache
 def names() -> list[str]:
-    """Return the names of chaospy's distributions."""
+    """Return the names of chaospy's distributions that can be described."""
     chaospy = load()
     return sorted(
         name
         for name in dir(chaospy)
         if isinstance(getattr(chaospy, name), type)
         and issubclass(getattr(chaospy, name), chaospy.Distribution)
-        and name != "Distribution"
+        and name not in _NOT_DESCRIBED
     )

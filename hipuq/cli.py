@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -18,6 +20,9 @@ app = typer.Typer(
 )
 
 _DEBUG = False
+
+CONNECT = "10s"
+"""How long to look for the scheduler of a cluster."""
 
 
 @app.callback()
@@ -39,6 +44,22 @@ def run(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from what an earlier run left in the output folder.")
     ] = False,
+    processes: Annotated[
+        bool, typer.Option("--processes", help="Evaluate in processes in place of threads; --jobs of them.")
+    ] = False,
+    dask: Annotated[
+        str | None,
+        typer.Option(
+            "--dask", help="Evaluate on the dask cluster whose scheduler has this ADDRESS.", metavar="ADDRESS"
+        ),
+    ] = None,
+    on_error: Annotated[
+        str,
+        typer.Option("--on-error", help="What becomes of a sample that fails: mark it, or raise an error."),
+    ] = "mark",
+    max_failed: Annotated[
+        float, typer.Option("--max-failed", help="Share of the samples of an analysis that may fail.")
+    ] = 0.5,
     dry_run: Annotated[
         bool,
         typer.Option(
@@ -47,6 +68,7 @@ def run(
     ] = False,
 ) -> None:
     """Run a study: outcomes, results.nc, figures and report.html."""
+    from hipuq.progress import log_to_stderr
     from hipuq.sampling import check_count
     from hipuq.study import load_study, run_study, would_keep
 
@@ -74,10 +96,22 @@ def run(
         for line in would_keep(plan, folder) if resume else ():
             typer.echo(f"  {line}")
         return
+    log_to_stderr()
     try:
-        tree = run_study(plan, folder, resume=resume, n_jobs=jobs, say=typer.echo)
-    except KeyboardInterrupt:
-        _fail(f"interrupted: what was complete is in {folder}; go on with --resume", 130)
+        with _executor(processes, dask) as executor:
+            tree = run_study(
+                plan,
+                folder,
+                resume=resume,
+                n_jobs=jobs,
+                executor=executor,
+                on_error=on_error,
+                max_failed=max_failed,
+                say=typer.echo,
+            )
+    except KeyboardInterrupt as stop:
+        what = str(stop).partition(";")[0] or f"what was complete is in {folder}"
+        _fail(f"interrupted: {what}; go on with --resume", 130)
     from hipuq.report.page import write_report
 
     page = write_report(tree, folder)
@@ -158,6 +192,28 @@ def list_(what: Annotated[str, typer.Argument(help="models or methods")]) -> Non
             typer.echo(f"{name}: {method.title}; options {text}")
     else:
         raise unknown_name("list", what, ["models", "methods"])
+
+
+@contextmanager
+def _executor(processes: bool, dask: str | None) -> Iterator[object]:
+    """Give what evaluates: nothing for threads, the word for processes, a client of dask's."""
+    from hipuq.errors import InputError, StoreError
+
+    if dask is None:
+        yield "processes" if processes else None
+        return
+    if processes:
+        raise InputError("--processes and --dask exclude each other: give one of them")
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise InputError("--dask needs dask.distributed: install hipuq[dask]") from error
+    try:
+        client: Any = Client(dask, timeout=CONNECT)  # type: ignore[no-untyped-call]
+    except (OSError, TimeoutError, ValueError, TypeError) as error:
+        raise StoreError(f"there is no dask scheduler at {dask!r}: {error}") from error
+    with client:
+        yield client
 
 
 def main() -> None:

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
-from hipuq import schema
+from hipuq.designs import Design, definition_of, with_fixed
 from hipuq.errors import InputError, check_name
-from hipuq.evaluation import evaluate, together
+from hipuq.evaluation import MAX_FAILED, How, evaluated, together
 from hipuq.inputs import Inputs
 from hipuq.methods import METHODS, Method
 from hipuq.sampling import Seed, seed_of, spawn
+
+DEFAULT: How = How()
+"""Evaluation in memory, with threads."""
 
 
 def method_named(name: str) -> Method:
@@ -91,6 +97,48 @@ def estimate(
     return estimated(record, outcomes, inputs, of=of, rng=rng, **options)
 
 
+def lazy_design(method: str, inputs: Inputs, n: int, rng: Seed = None, **options: Any) -> Design:
+    """Return the samples that a method wants evaluated, made when they are needed, rows at a time.
+
+    Parameters
+    ----------
+    method, inputs, n, rng
+        As in `design`.
+    **options
+        Options of the method's design.
+
+    Returns
+    -------
+    Design
+        For `evaluate` with a store: the same samples as of `design`, never in memory together.
+
+    Examples
+    --------
+    >>> import chaospy as cp
+    >>> import hipuq
+    >>> model = hipuq.models.two_dof("hoffmann2002")
+    >>> inputs = model.inputs(friction=cp.Uniform(0.0, 1.0))
+    >>> design = hipuq.lazy_design("monte_carlo", inputs, n=10_000_000, rng=1)
+    >>> len(design), design.rows(9_999_000, 10_000_000).sizes["sample"]
+    (10000000, 1000)
+    """
+    _check_inputs(inputs)
+    record = method_named(method)
+    record.check("design", options)
+    return by_rows(record, inputs, n, seed_of(rng), options)
+
+
+def by_rows(record: Method, inputs: Inputs, n: int, seed: int, options: Mapping[str, Any]) -> Design:
+    """Return a design of a method by rows."""
+    known = record.options("evaluations")
+    size = record.evaluations(inputs, n, **{key: own for key, own in options.items() if key in known})
+
+    def make(rows: slice) -> xr.Dataset:
+        return record.design(inputs, n, seed, rows=rows, **options)
+
+    return Design(size, make, definition_of(make(slice(0, 1)).attrs, size))
+
+
 def run(
     model: Callable[..., xr.Dataset],
     inputs: Inputs,
@@ -100,8 +148,12 @@ def run(
     of: str,
     rng: Seed = None,
     n_jobs: int | None = None,
-    executor: Executor | None = None,
+    executor: Executor | str | Any = None,
     progress: bool | None = None,
+    store: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    on_error: str = "mark",
+    max_failed: float = MAX_FAILED,
     **options: Any,
 ) -> xr.Dataset:
     """Design, evaluate and estimate in one call.
@@ -120,8 +172,8 @@ def run(
         Name of the outcome to analyse; nothing else is evaluated.
     rng : int or Generator, optional
         Seed.
-    n_jobs, executor, progress
-        As in `evaluate`.
+    n_jobs, executor, progress, store, resume, on_error, max_failed
+        As in `evaluate`. With a store samples are made by rows, and memory does not grow with them.
     **options
         Options of the method; each stage gets its own.
 
@@ -131,18 +183,8 @@ def run(
         Results, as from `estimate`.
     """
     record, stages = check_arguments(inputs, method, n, of, options)
-    outcomes = completed(
-        model,
-        inputs,
-        record,
-        n,
-        seed_of(rng),
-        of=[of],
-        stages=stages,
-        n_jobs=n_jobs,
-        executor=executor,
-        progress=progress,
-    )
+    how = How(n_jobs, executor, progress, store, resume, on_error, max_failed)
+    (outcomes,) = completed(model, inputs, record, n, seed_of(rng), of=[of], stages=stages, how=how)
     return estimated(record, outcomes, inputs, of=of, **stages["estimate"])
 
 
@@ -183,12 +225,10 @@ def completed(
     *,
     of: Sequence[str],
     stages: Mapping[str, Mapping[str, Any]],
-    fixed: Mapping[str, float] | None = None,
+    at: Sequence[Mapping[str, float]] = ({},),
     keep: Sequence[str] = (),
-    n_jobs: int | None = None,
-    executor: Executor | None = None,
-    progress: bool | None = None,
-) -> xr.Dataset:
+    how: How = DEFAULT,
+) -> list[xr.Dataset]:
     """Design and evaluate, and what a sequential method then still wants, round after round.
 
     Parameters
@@ -204,38 +244,62 @@ def completed(
         Outcomes to analyse; the first one is what a sequential method looks at.
     stages : mapping
         Options by stage, as from `Method.split`.
-    fixed : mapping, optional
-        Parameters that are not uncertain -> the value that all samples get.
+    at : sequence of mapping
+        Points at which the same samples are evaluated: parameter that is not uncertain -> its value.
     keep : sequence of str
         Outcomes wanted besides.
-    n_jobs, executor, progress
-        As in `evaluate`.
+    how : How
+        How to evaluate.
 
     Returns
     -------
-    Dataset
-        Outcomes of all rounds.
+    list of Dataset
+        Outcomes of all rounds, at each point.
     """
-
-    def evaluated(samples: xr.Dataset) -> xr.Dataset:
-        wanted = [*with_bounds(of, model), *(name for name in keep if name not in of)]
-        values = {
-            name: ("sample", np.full(samples.sizes["sample"], value), _attrs(name))
-            for name, value in (fixed or {}).items()
-        }
-        samples = samples.assign(values)
-        return evaluate(model, samples, keep=wanted, n_jobs=n_jobs, executor=executor, progress=progress)
-
-    outcomes = evaluated(record.design(inputs, n, seed, **stages["design"]))
+    wanted = [*with_bounds(of, model), *(name for name in keep if name not in of)]
+    base = by_rows(record, inputs, n, seed, stages["design"])
+    design = base.at(at)
+    whole = evaluated(model, design, wanted, how)
+    places: list[Places] = [slice(k * base.size, (k + 1) * base.size) for k in range(len(at))]
     number = 1
     while record.refine is not None:
         with one_thread():
-            more = record.refine(outcomes, inputs, spawn(seed, number), of=of[0], **stages["refine"])
-        if more is None:
+            more = [
+                record.refine(part, inputs, spawn(seed, number), of=of[0], **stages["refine"])
+                for part in _parts(whole, places)
+            ]
+        for k, (own, point) in enumerate(zip(more, at, strict=True)):
+            if own is None:
+                continue
+            own = with_fixed(own, point)
+            size = whole.sizes["sample"]
+            design = design.followed_by(own)
+            # What is there already is in the store, or in memory.
+            if how.store is None:
+                whole = together(whole, evaluated(model, own, wanted, how))
+            else:
+                whole = evaluated(model, design, wanted, replace(how, resume=True, replace=False))
+            places[k] = np.concatenate([_numbers(places[k]), np.arange(size, design.size)])
+        if all(own is None for own in more):
             break
-        outcomes = together(outcomes, evaluated(more))
         number += 1
-    return outcomes
+    return _parts(whole, places)
+
+
+Places = slice | NDArray[np.int64]
+
+
+def _numbers(places: Places) -> NDArray[np.int64]:
+    return np.arange(places.start, places.stop) if isinstance(places, slice) else places
+
+
+def _parts(whole: xr.Dataset, places: Sequence[Places]) -> list[xr.Dataset]:
+    """Return parts of outcomes, each with its share of the time."""
+    if len(places) == 1:
+        return [whole]
+    size, seconds = whole.sizes["sample"], float(whole.attrs.get("seconds", np.nan))
+    parts = [whole.isel(sample=rows) for rows in places]
+    return [part.assign_attrs(seconds=seconds * part.sizes["sample"] / size) for part in parts]
 
 
 def estimated(record: Method, outcomes: xr.Dataset, inputs: Inputs, **options: Any) -> xr.Dataset:
@@ -271,11 +335,6 @@ def with_bounds(of: Iterable[str], model: Callable[..., xr.Dataset]) -> list[str
     known = getattr(model, "outcomes", ())
     bounds = [f"{name}_{end}" for name in names for end in ("low", "high")]
     return [*names, *(name for name in bounds if name in known)]
-
-
-def _attrs(name: str) -> dict[str, Any]:
-    """Return the attributes of a parameter that all samples have alike."""
-    return schema.PARAMETERS[name].attrs if name in schema.PARAMETERS else {"long_name": name, "units": ""}
 
 
 def _check_of(of: object) -> None:

@@ -104,6 +104,8 @@ class FrictionIntegrated:
     outcomes = (*schema.INTEGRATED, "status", "decided_by")
     block = 128
     """Samples that it takes at a time: each is worth hundreds."""
+    ragged = ("interval",)
+    """Dims whose length depends on the samples."""
 
     def __init__(self, model: CEAModel, distribution: Distribution) -> None:
         self.model = model

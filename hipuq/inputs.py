@@ -13,12 +13,9 @@ from numpy.typing import NDArray
 from hipuq import schema
 from hipuq.contact import ContactPatterns
 from hipuq.errors import InputError, SchemaError, unknown_name
-from hipuq.variation import Input, Nominal, as_input
+from hipuq.variation import HIGHEST, LOWEST, Input, Nominal, as_input
 
 Array = NDArray[np.float64]
-
-# Quantiles at 0 and 1 may be infinite; designs can touch 0, and 1 by rounding.
-_LOWEST, _HIGHEST = 2.0**-64, 1.0 - 2.0**-53
 
 
 class Inputs(Mapping[str, Input]):
@@ -167,7 +164,7 @@ class Inputs(Mapping[str, Input]):
         Dataset
             One variable for each input, over ``sample`` and its element dim.
         """
-        points = np.clip(np.asarray(u, dtype=np.float64), _LOWEST, _HIGHEST)
+        points = np.clip(np.asarray(u, dtype=np.float64), LOWEST, HIGHEST)
         if points.ndim != 2 or points.shape[1] != self.dimension:
             raise InputError(f"points have the shape {points.shape}: they need {self.dimension} columns")
         return _merged(entry.variables(part) for entry, part in self._columns(points))
@@ -256,8 +253,13 @@ class Inputs(Mapping[str, Input]):
         try:
             data = json.loads(text)
             inputs._entries = {name: Input.from_dict(name, entry) for name, entry in data.items()}
-        except (json.JSONDecodeError, KeyError, TypeError, AttributeError) as error:
+        except InputError:
+            raise
+        except (KeyError, TypeError, ValueError, OverflowError, AttributeError, RecursionError) as error:
             raise InputError(f"not a description of inputs: {error}") from error
+        # What `without` leaves may be none.
+        if inputs._entries:
+            inputs._check()
         return inputs
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import SchemaError
+from hipuq.estimation.reduction import flag_counts, read, slices
 from hipuq.fragility_curve import weights_of
 
 Array = NDArray[np.float64]
@@ -49,12 +50,22 @@ def frequency_ranges(outcomes: xr.Dataset) -> xr.Dataset:
             or set(outcomes[name].dims) != {"sample", "mode"}
         ):
             raise SchemaError(f"frequency ranges need {name!r} over sample and mode: keep it in evaluate")
-    frequency, verdict = (outcomes[name].transpose("mode", "sample") for name in ("frequency", "unstable"))
-    unstable = (verdict.values == 1) & np.isfinite(frequency.values)
+    both = [outcomes[name].transpose("sample", "mode") for name in ("frequency", "unstable")]
+    verdict = both[1]
     weight = weights_of(outcomes)
-    found = np.array(
-        [_quantiles(own[where], weight[where]) for own, where in zip(frequency.values, unstable, strict=True)]
-    )
+    modes = range(verdict.sizes["mode"])
+    # Only what is unstable is kept: few modes ever are.
+    parts: list[list[tuple[Array, Array]]] = [[] for _ in modes]
+    known = np.zeros(len(modes), np.int64)
+    for rows in slices(len(weight)):
+        frequency, flag = (np.asarray(read(part, rows), np.float64) for part in both)
+        known += (~np.isnan(flag)).sum(axis=0)
+        where = (flag == 1) & np.isfinite(frequency)
+        for mode in modes:
+            own = where[:, mode]
+            parts[mode].append((frequency[own, mode], weight[rows][own]))
+    unstable = [[np.concatenate(arrays) for arrays in zip(*of_mode, strict=True)] for of_mode in parts]
+    found = np.array([_quantiles(*pair) for pair in unstable])
     data: dict[str, Any] = {}
     for name, level, values in zip(FREQUENCIES, LEVELS, found.T, strict=True):
         attrs = {
@@ -63,14 +74,14 @@ def frequency_ranges(outcomes: xr.Dataset) -> xr.Dataset:
         }
         data[name] = ("mode", values, attrs)
     counts = {
-        "unstable_samples": ("samples in which the mode is unstable", unstable),
-        "known_samples": (
-            "samples in which it is known whether the mode is unstable",
-            verdict.notnull().values,
+        "unstable_samples": (
+            "samples in which the mode is unstable",
+            np.array([len(pair[0]) for pair in unstable], np.int64),
         ),
+        "known_samples": ("samples in which it is known whether the mode is unstable", known),
     }
-    for name, (text, where) in counts.items():
-        data[name] = ("mode", where.sum(axis=1), {"long_name": text, "units": "1"})
+    for name, (text, count) in counts.items():
+        data[name] = ("mode", count, {"long_name": text, "units": "1"})
     coords = {name: coord for name, coord in verdict.coords.items() if coord.dims == ("mode",)}
     ranges = schema.stamp(xr.Dataset(data, coords=coords), "frequency ranges", like=outcomes.attrs)
     return ranges.assign_attrs(levels=list(LEVELS))
@@ -108,9 +119,8 @@ def verdict_counts(outcomes: xr.Dataset) -> xr.Dataset:
     )
     for dim, name, text, flags in tables:
         if dim in outcomes:
-            flag = outcomes[dim].values
-            counts = np.array([(flag == value).sum() for value in flags.values()], np.int64)
-            data[name] = (dim, counts, {"long_name": text, "units": "1"})
+            found = flag_counts(outcomes[dim], flags)
+            data[name] = (dim, np.array(list(found.values()), np.int64), {"long_name": text, "units": "1"})
             attrs = {"long_name": "status" if dim == "status" else "decided by", "units": ""}
             coords[dim] = (dim, np.array(list(flags)), attrs)
     return schema.stamp(xr.Dataset(data, coords=coords), "verdict counts", like=outcomes.attrs)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -20,6 +22,13 @@ BLOCK = 4096
 
 LATIN_HYPERCUBE_MAXIMUM = 2**22
 """Largest latin hypercube, which has to be made whole."""
+
+LATIN_HYPERCUBE_KEPT = 2**25
+"""Most numbers of a latin hypercube that is kept for the next rows asked for (256 MiB)."""
+
+POINTS = 2**21
+"""Numbers of points that a design asks for at a time (16 MiB), in whole blocks: a Sobol sequence is scrambled
+and run forward anew each time."""
 
 SAMPLERS = ("random", "latin_hypercube", "sobol")
 
@@ -137,16 +146,26 @@ def unit_points(sampler: str, n: int, dimension: int, seed: int, key: tuple[int,
         return _random(dimension, seed, key, rows)
     from scipy.stats import qmc
 
-    rng = spawn(seed, *key)
     if sampler == "latin_hypercube":
-        return np.asarray(qmc.LatinHypercube(dimension, rng=rng).random(n))[rows]
-    sequence = qmc.Sobol(dimension, scramble=True, rng=rng)
+        made = _kept_hypercube if n * dimension <= LATIN_HYPERCUBE_KEPT else _hypercube
+        return made(n, dimension, seed, key)[rows].copy()
+    sequence = qmc.Sobol(dimension, scramble=True, rng=spawn(seed, *key))
     if rows.start:
         sequence.fast_forward(rows.start)
         return np.asarray(sequence.random(rows.stop - rows.start))
     # A first draw of other than a power of 2 points, as a slice may be, would warn: draw one first.
     first = sequence.random(1)
     return np.concatenate([first, sequence.random(rows.stop - 1)]) if rows.stop > 1 else first
+
+
+def _hypercube(n: int, dimension: int, seed: int, key: tuple[int, ...]) -> Array:
+    from scipy.stats import qmc
+
+    return np.asarray(qmc.LatinHypercube(dimension, rng=spawn(seed, *key)).random(n))
+
+
+# A design made by rows asks for slices of the same hypercube one after the other.
+_kept_hypercube = lru_cache(maxsize=1)(_hypercube)
 
 
 def _random(dimension: int, seed: int, key: tuple[int, ...], rows: slice) -> Array:
@@ -202,11 +221,27 @@ def samples_by_block(inputs: Inputs, points: Callable[[slice], Array], rows: sli
         Over ``sample``, numbered by row.
     """
     parts = []
-    for start in range(rows.start // BLOCK * BLOCK, rows.stop, BLOCK):
-        stop = min(start + BLOCK, total)
-        # The numbers keep the dim where a stratum leaves no other input.
-        part = inputs.samples(points(slice(start, stop))).assign_coords(sample=np.arange(start, stop))
-        parts.append(part.isel(sample=slice(max(rows.start - start, 0), rows.stop - start)))
-    whole = parts[0] if len(parts) == 1 else xr.concat(parts, "sample", data_vars="all", join="exact")
-    numbers = np.arange(rows.start, rows.stop)
-    return whole.assign_coords(sample=("sample", numbers, schema.COORDINATES["sample"].attrs))
+    step = BLOCK * max(1, POINTS // (BLOCK * max(inputs.dimension, 1)))
+    for first in range(rows.start // BLOCK * BLOCK, rows.stop, step):
+        last = min(first + step, -(-rows.stop // BLOCK) * BLOCK, total)
+        u = points(slice(first, last))
+        for start in range(first, last, BLOCK):
+            part = inputs.samples(u[start - first : start - first + BLOCK])
+            wanted = slice(max(rows.start - start, 0), rows.stop - start)
+            # Where a stratum leaves no other input there is no dim either.
+            parts.append(part.isel(sample=wanted) if part.sizes else part)
+    numbers = ("sample", np.arange(rows.start, rows.stop), schema.COORDINATES["sample"].attrs)
+    return _joined(parts).assign_coords(sample=numbers)
+
+
+def _joined(parts: Sequence[xr.Dataset]) -> xr.Dataset:
+    """Return blocks of samples one after the other; xr.concat would align and compare them."""
+    joined: dict[Any, Any] = {}
+    for name, values in parts[0].variables.items():
+        if "sample" in values.dims:
+            arrays = [part.variables[name].values for part in parts]
+            joined[name] = (values.dims, np.concatenate(arrays, values.dims.index("sample")), values.attrs)
+        else:
+            joined[name] = values
+    coords = {name: joined.pop(name) for name in parts[0].coords}
+    return xr.Dataset(joined, coords)

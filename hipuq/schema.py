@@ -17,6 +17,9 @@ import xarray as xr
 
 from hipuq.errors import SchemaError, check_name, unknown_name
 
+VERSION = 1
+"""Version of the schema; stores of another one are not gone on with."""
+
 VERDICT = "verdict"
 """Role of a variable of 1 (yes), 0 (no) and NaN (unknown)."""
 

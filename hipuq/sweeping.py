@@ -16,6 +16,7 @@ from hipuq.combinations import at as at
 from hipuq.combinations import swept as swept
 from hipuq.driver import check_arguments, completed, estimated
 from hipuq.errors import InputError, check_name
+from hipuq.evaluation import How
 from hipuq.inputs import Inputs
 from hipuq.sampling import Seed, seed_of
 
@@ -39,7 +40,7 @@ def sweep(
     of: str,
     rng: Seed = None,
     n_jobs: int | None = None,
-    executor: Executor | None = None,
+    executor: Executor | str | Any = None,
     progress: bool | None = None,
     **options: Any,
 ) -> xr.Dataset:
@@ -93,22 +94,10 @@ def sweep(
     """
     record, stages = check_arguments(inputs, method, n, of, options)
     values = check_over(over, model, inputs)
-    seed = seed_of(rng)
+    seed, how = seed_of(rng), How(n_jobs, executor, progress)
     parts = []
     for fixed in points(values):
-        outcomes = completed(
-            model,
-            inputs,
-            record,
-            n,
-            seed,
-            of=[of],
-            stages=stages,
-            fixed=fixed,
-            n_jobs=n_jobs,
-            executor=executor,
-            progress=progress,
-        )
+        (outcomes,) = completed(model, inputs, record, n, seed, of=[of], stages=stages, at=[fixed], how=how)
         parts.append(estimated(record, outcomes, inputs, of=of, **stages["estimate"]))
     return gathered(parts, values)
 

@@ -17,6 +17,17 @@ from hipuq.errors import InputError
 
 Array = NDArray[np.float64]
 
+# Ends of what designs draw: quantiles at 0 and 1 may be infinite, and designs can touch 0, and 1 by rounding.
+LOWEST, HIGHEST = 2.0**-64, 1.0 - 2.0**-53
+
+# What is too large for numbers is refused for what it then is, not warned of.
+_UNWARNED = np.errstate(all="ignore")
+
+HOW = ("absolute", "relative", "shift")
+"""How a distribution applies to a nominal value."""
+
+_PROBES = np.array([LOWEST, 1e-9, 1e-3, 0.1, 0.5, 0.9, 0.999, 1 - 1e-9, HIGHEST])
+
 
 @dataclass(frozen=True)
 class Nominal:
@@ -36,6 +47,7 @@ class Variation:
     nominal: Any
 
 
+@_UNWARNED
 def relative(distribution: object, *, each: str | None = None, nominal: ArrayLike | None = None) -> Variation:
     """Vary a parameter around its nominal value: nominal value times (1 + draw).
 
@@ -55,6 +67,7 @@ def relative(distribution: object, *, each: str | None = None, nominal: ArrayLik
     return Variation("relative", as_distribution(distribution, "relative distribution"), each, nominal)
 
 
+@_UNWARNED
 def shift(distribution: object, *, each: str | None = None, nominal: ArrayLike | None = None) -> Variation:
     """Vary a parameter around its nominal value: nominal value plus draw.
 
@@ -222,25 +235,68 @@ class Input:
         }
 
     @classmethod
+    @_UNWARNED
     def from_dict(cls, name: str, data: Mapping[str, Any]) -> Input:
-        """Return the input that `to_dict` describes."""
-        if data["how"] == "contact_patterns":
+        """Return the input that `to_dict` describes.
+
+        Raises
+        ------
+        InputError
+            If something in the description cannot be used.
+        """
+        how = data["how"]
+        if how == "contact_patterns":
             rest = {key: value for key, value in data.items() if key != "how"}
             return _contact(name, ContactPatterns(**rest))
-        return cls(
-            name,
-            from_description(data["distribution"]),
-            data["how"],
-            tuple(data["dims"]),
-            np.asarray(data["nominal"], dtype=np.float64),
-            data["each"],
-        )
+        if how not in HOW:
+            raise InputError(f"{name} is {how!r}: it must be one of {', '.join(HOW)}, or contact_patterns")
+        dims, each = data["dims"], data["each"]
+        if not isinstance(dims, list) or not all(isinstance(dim, str) and dim for dim in dims):
+            raise InputError(f"dims of {name} are {dims!r}: they must be a list of names")
+        nominal = _numbers(name, data["nominal"])
+        if nominal.ndim != len(dims) or nominal.ndim > 1:
+            raise InputError(f"nominal of {name} has {nominal.ndim} dims, and {len(dims)} names of them")
+        if not isinstance(each, bool) or (each and (how == "absolute" or not dims)):
+            raise InputError(f"each of {name} is {each!r}: only a change of elements has a draw for each")
+        return _checked(cls(name, from_description(data["distribution"]), how, tuple(dims), nominal, each))
+
+
+def _numbers(name: str, nominal: object) -> Array:
+    """Return a nominal value as an array of finite numbers."""
+    try:
+        values = np.asarray(nominal, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"nominal of {name} is {nominal!r}: it must be numbers") from None
+    if not np.isfinite(values).all() or not values.size:
+        raise InputError(f"nominal of {name} is {values.tolist()}: it must be finite")
+    return values
+
+
+def _checked(entry: Input) -> Input:
+    """Return an input once its values are known to be finite numbers, wherever designs can draw them.
+
+    A distribution that gives numbers in the middle may give none at its ends, and a change of a nominal
+    value can be too large for it.
+    """
+    found = np.asarray(entry.drawn.ppf(_PROBES), dtype=np.float64)
+    values = entry._applied(np.broadcast_to(found[:, None], (len(found), entry.columns)))
+    if not np.isfinite(values).all():
+        bad = _PROBES[~np.isfinite(values).reshape(len(_PROBES), -1).all(axis=1)][0]
+        raise InputError(f"{entry.name} is no finite number at the quantile {bad:.12g}: check its arguments")
+    lower, upper = entry.drawn.support
+    slack = 1e-9 * np.abs(found).max()
+    if (np.diff(found) < -slack).any():
+        raise InputError(f"{entry.name} has quantiles that fall: its ppf must not decrease")
+    if found[0] < lower - slack or found[-1] > upper + slack:
+        raise InputError(f"{entry.name} has quantiles outside its support {lower:g} to {upper:g}")
+    return entry
 
 
 def _contact(name: str, patterns: ContactPatterns) -> Input:
     return Input(name, patterns, "absolute", ("oscillator",), np.zeros(patterns.oscillators), False)
 
 
+@_UNWARNED
 def as_input(name: str, value: object, known: Nominal | None) -> Input:
     """Return the input of one parameter.
 
@@ -273,15 +329,11 @@ def as_input(name: str, value: object, known: Nominal | None) -> Input:
         return _contact(name, value)
     if not isinstance(value, Variation):
         shape = known.values if known else np.zeros(())
-        return Input(
-            name, as_distribution(value, name), "absolute", known.dims if known else (), shape, False
-        )
+        dims = known.dims if known else ()
+        return _checked(Input(name, as_distribution(value, name), "absolute", dims, shape, False))
     if value.nominal is None and known is None:
         raise InputError(f"{name} is {value.how} to a nominal value that nobody knows: give nominal=")
-    try:
-        nominal = known.values if known and value.nominal is None else np.asarray(value.nominal, np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"nominal of {name} is {value.nominal!r}: it must be numbers") from None
+    nominal = known.values if known and value.nominal is None else _numbers(name, value.nominal)
     dims = known.dims if known else ((value.each,) if value.each and nominal.ndim else ())
     if known and nominal.shape not in ((), known.values.shape):
         raise InputError(f"nominal of {name} has the shape {nominal.shape}: it needs {known.values.shape}")
@@ -292,6 +344,4 @@ def as_input(name: str, value: object, known: Nominal | None) -> Input:
     if value.each is not None and (value.each,) != dims:
         allowed = f"each={dims[0]!r}" if dims else "no each, it is one number"
         raise InputError(f"each is {value.each!r} for {name}: allowed is {allowed}")
-    if not np.isfinite(nominal).all():
-        raise InputError(f"nominal of {name} is {nominal.tolist()}: it must be finite")
-    return Input(name, value.distribution, value.how, dims, nominal, value.each is not None)
+    return _checked(Input(name, value.distribution, value.how, dims, nominal, value.each is not None))

@@ -299,7 +299,7 @@ def test_unknown_outcomes_are_left_out_and_widen_probabilities():
     assert "10.0% of the samples to fit are unknown" in results["trusted"].attrs["reasons"]
     width = [float(r["probability_high"] - r["probability_low"]) for r in (results, known)]
     assert width[0] > width[1] + 0.05
-    assert int(results["undecided"]) == int(np.isnan(results["true"]).sum()) + 40
+    assert int(results["failed"]) == int(np.isnan(results["true"]).sum()) + 40
 
 
 def test_nothing_known():

@@ -83,13 +83,13 @@ def test_closed_forms_are_those_of_quadrature():
 
 @pytest.mark.parametrize("name", ANSWERS)
 def test_models_have_the_probability_of_the_closed_form(name):
-    """Of 65,536 Sobol points: far nearer than a mistake in a formula would be."""
+    """Of 16,384 Sobol points: far nearer than a mistake in a formula would be."""
     answer = ANSWERS[name]()
     found = hipuq.run(
         answer.model,
         answer.inputs,
         method="monte_carlo",
-        n=2**16,
+        n=2**14,
         of="any_unstable",
         sampler="sobol",
         rng=1,
@@ -213,9 +213,9 @@ def slope(model, inputs, of, sampler, truth, sizes, designs, seed):
     ],
 )
 def test_errors_of_verdicts_fall_as_theory_says(name, sampler, expected):
-    """Measured from 800 designs of 8 to 2048 points: -0.50, -0.51, -1.06, -0.75, -0.74, -0.65."""
+    """Measured from 800 designs of 8 to 512 points: -0.49, -0.51, -1.01, -0.77, -0.73, -0.66."""
     answer = ANSWERS[name]()
-    sizes = [8, 32, 128, 512, 2048]
+    sizes = [8, 32, 128, 512]
     found = slope(answer.model, answer.inputs, "any_unstable", sampler, answer.probability, sizes, 100, 1)
     assert found == pytest.approx(expected, abs=0.12)
 

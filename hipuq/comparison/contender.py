@@ -14,6 +14,7 @@ import xarray as xr
 
 from hipuq.driver import completed, estimated, method_named
 from hipuq.errors import InputError, UnknownNameError, check_name
+from hipuq.evaluation import How
 from hipuq.inputs import Inputs
 from hipuq.methods import Method
 from hipuq.sampling import check_count
@@ -90,16 +91,9 @@ class Contender:
 
     def results(self, n: int, seed: int, n_jobs: int | None) -> xr.Dataset:
         """Return the results of a run."""
-        outcomes = completed(
-            self.model,
-            self.inputs,
-            self.method,
-            n,
-            seed,
-            of=[self.of],
-            stages=self.stages,
-            n_jobs=n_jobs,
-            progress=False,
+        how = How(n_jobs=n_jobs, progress=False)
+        (outcomes,) = completed(
+            self.model, self.inputs, self.method, n, seed, of=[self.of], stages=self.stages, how=how
         )
         return estimated(self.method, outcomes, self.inputs, of=self.of, **self.stages["estimate"])
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from hipuq import _chaospy
-from hipuq.distributions.base import PROBES, Distribution, check_quantiles
+from hipuq.distributions.base import PROBES, Array, Distribution, check_quantiles
 from hipuq.errors import InputError
 
 
@@ -73,8 +74,8 @@ def _from_chaospy(value: Any, name: str) -> Distribution:
         description = {"kind": "opaque", "text": repr(value)}
     return Distribution(
         value,
-        lambda u: _chaospy.ppf(value, u),
-        lambda x: _chaospy.cdf(value, x),
+        partial(_chaospy.ppf, value),
+        partial(_chaospy.cdf, value),
         _chaospy.support(value),
         description,
     )
@@ -94,11 +95,16 @@ def _from_ppf(value: Any) -> Distribution:
     ends = np.asarray(value.ppf(np.array([0.0, 1.0])), dtype=np.float64)
     return Distribution(
         value,
-        lambda u: np.asarray(value.ppf(u), dtype=np.float64),
-        (lambda x: np.asarray(cdf(x), dtype=np.float64)) if callable(cdf) else None,
+        partial(_doubles, value.ppf),
+        partial(_doubles, cdf) if callable(cdf) else None,
         (float(ends[0]), float(ends[1])),
         description,
     )
+
+
+def _doubles(function: Callable[[Array], Any], points: Array) -> Array:
+    """Return what a function of another library gives, as an array of doubles."""
+    return np.asarray(function(points), dtype=np.float64)
 
 
 def _rebuilds(description: Mapping[str, Any], value: Any) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hipuq import _chaospy
 from hipuq.errors import InputError
 
 Array = NDArray[np.float64]
@@ -56,8 +57,22 @@ class Distribution:
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Say how to pickle it, so that it can go to another process."""
+        return _blank, (_chaospy.is_distribution(self.source),), self.__dict__
+
     def __repr__(self) -> str:
         return f"Distribution({self.source!r})"
+
+
+def _blank(of_chaospy: bool) -> Distribution:
+    """Return a distribution to unpickle one into.
+
+    In a new process that would import chaospy, which reconfigures the root logger, so it is loaded first.
+    """
+    if of_chaospy:
+        _chaospy.load()
+    return Distribution.__new__(Distribution)
 
 
 def _parts(description: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:

@@ -7,6 +7,7 @@ load (mixed); Oberst et al., INTER-NOISE 2016, p. 5539.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -138,7 +139,7 @@ def lubrication(
     for name, value in limits.items():
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not value > 0:
             raise InputError(f"{name} is {value!r}: it must be a number above 0")
-    if not boundary_below < film_from < np.inf:
+    if not boundary_below < film_from <= sys.float_info.max:
         raise InputError(
             f"boundary_below is {boundary_below:g} and film_from {film_from:g}: "
             "the first must be less, and both finite"
@@ -211,9 +212,9 @@ def _weights(
             )
         return {name: float(ratio[name]) for name in REGIMES}, {"text": "probabilities of the regimes"}
     if isinstance(ratio, (int, float, np.number)) and not isinstance(ratio, bool):
+        if not 0 <= ratio <= sys.float_info.max:
+            raise InputError(f"lambda_ratio is {ratio}: it must be finite and not negative")
         number = float(ratio)
-        if not 0 <= number < np.inf:
-            raise InputError(f"lambda_ratio is {number:g}: it must be finite and not negative")
         only = "boundary" if number < boundary_below else "mixed" if number < film_from else "film"
         return {name: float(name == only) for name in REGIMES}, {"value": number, "text": f"{number:g}"}
     found = _default("lambda_ratio") if ratio is None else as_distribution(ratio, "lambda_ratio")

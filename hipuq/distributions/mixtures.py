@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -148,7 +149,7 @@ def mixture_of(components: Sequence[Component], more: Mapping[str, Any] | None =
     for number, part in enumerate(components, 1):
         weight: object = part.weight
         known = isinstance(weight, (int, float, np.number)) and not isinstance(weight, bool)
-        if not (known and np.isfinite(part.weight) and part.weight >= 0):
+        if not (known and 0 <= part.weight <= sys.float_info.max):
             raise InputError(
                 f"the weight of component {part.name or number} is {weight!r}: "
                 "it must be a finite number that is not negative"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,6 +13,55 @@ from numpy.typing import NDArray
 from hipuq.errors import InputError
 
 Array = NDArray[np.float64]
+Groups = Callable[[slice], NDArray[np.intp]]
+"""Rows -> group of each sample, from 0."""
+
+BLOCK = 65_536
+"""Samples held in memory at a time. Sums are made block by block: another size gives other last digits."""
+
+
+def slices(samples: int, block: int | None = None) -> Iterator[slice]:
+    """Yield the rows of each block of samples, `BLOCK` of them if nothing else is asked for."""
+    step = BLOCK if block is None else block
+    for start in range(0, samples, step):
+        yield slice(start, min(start + step, samples))
+
+
+def read(values: xr.DataArray, rows: slice) -> NDArray[Any]:
+    """Return the values of some samples, which is all that is read of a lazy array."""
+    return np.asarray(values.variable.isel(sample=rows).values)
+
+
+def one_group(rows: slice) -> NDArray[np.intp]:
+    """Return the group of samples that are not divided."""
+    return np.zeros(rows.stop - rows.start, np.intp)
+
+
+def by_block(values: xr.DataArray) -> Iterator[NDArray[Any]]:
+    """Yield the values over ``sample``, block by block."""
+    for rows in slices(values.sizes["sample"]):
+        yield read(values, rows)
+
+
+def flag_counts(values: xr.DataArray, flags: Mapping[str, int]) -> dict[str, int]:
+    """Return how many samples have each value of a flag variable.
+
+    Parameters
+    ----------
+    values : DataArray
+        Over ``sample``.
+    flags : mapping of str to int
+        Meaning -> value.
+
+    Returns
+    -------
+    dict of str to int
+    """
+    counts = dict.fromkeys(flags, 0)
+    for part in by_block(values):
+        for name, value in flags.items():
+            counts[name] += int((part == value).sum())
+    return counts
 
 
 @dataclass(frozen=True)
@@ -80,20 +131,21 @@ class Moments:
         return Moments(self.size, size, filled, squares)
 
 
-def moments(values: xr.DataArray, groups: NDArray[np.intp], count: int, block: int = 65_536) -> Moments:
+def moments(
+    values: xr.DataArray, groups: NDArray[np.intp] | Groups, count: int, block: int | None = None
+) -> Moments:
     """Reduce a variable over ``sample`` by group, block by block, so that it may be lazy.
 
     Parameters
     ----------
     values : DataArray
         ``sample`` first.
-    groups : (samples,) array of int
-        Group of each sample, from 0.
+    groups : (samples,) array of int, or callable
+        Group of each sample, from 0; or rows -> groups of those samples.
     count : int
         Number of groups.
-    block : int
-        Samples held in memory at a time; blocks are merged by the update of Chan, Golub and
-        LeVeque (1983).
+    block : int, optional
+        Samples held in memory at a time, `BLOCK` by default.
 
     Returns
     -------
@@ -104,32 +156,81 @@ def moments(values: xr.DataArray, groups: NDArray[np.intp], count: int, block: i
     InputError
         If a value is infinite.
     """
-    shape = values.shape[1:]
-    width = int(np.prod(shape, dtype=int))
-    known, mean, squares = np.zeros((3, count, width))
-    infinite = 0
-    for start in range(0, values.sizes["sample"], block):
-        rows = slice(start, start + block)
-        x = np.asarray(values[rows].values, dtype=np.float64).reshape(-1, width)
-        infinite += int(np.isinf(x).any(axis=1).sum())
-        if infinite:
-            continue
-        for column in range(width):
+    of = groups if callable(groups) else groups.__getitem__
+    return reduced([values], [(of, count)], block)[0][0]
+
+
+def reduced(
+    variables: Sequence[xr.DataArray], groupings: Sequence[tuple[Groups, int]], block: int | None = None
+) -> list[list[Moments]]:
+    """Reduce several variables over ``sample`` by several groupings, reading every block once.
+
+    Parameters
+    ----------
+    variables : sequence of DataArray
+        ``sample`` first.
+    groupings : sequence of (callable, int)
+        Rows -> group of each sample, and the number of groups.
+    block : int, optional
+        Samples held in memory at a time, `BLOCK` by default.
+
+    Returns
+    -------
+    list of list of Moments
+        For each grouping those of each variable.
+
+    Raises
+    ------
+    InputError
+        If a value is infinite.
+    """
+    samples = variables[0].sizes["sample"]
+    sums = [[_Sums(count, values.shape[1:]) for values in variables] for _, count in groupings]
+    infinite = [0] * len(variables)
+    for rows in slices(samples, block):
+        groups = [of(rows) for of, _ in groupings]
+        for i, values in enumerate(variables):
+            width = int(np.prod(values.shape[1:], dtype=int))
+            x = np.asarray(read(values, rows), dtype=np.float64).reshape(-1, width)
+            infinite[i] += int(np.isinf(x).any(axis=1).sum())
+            if not any(infinite):
+                for own, group in zip(sums, groups, strict=True):
+                    own[i].add(x, group)
+    for values, found in zip(variables, infinite, strict=True):
+        if found:
+            raise not_finite(str(values.name), found, samples, "it has no mean")
+    return [[one.moments() for one in own] for own in sums]
+
+
+class _Sums:
+    """Moments in the making; blocks are merged by the update of Chan, Golub and LeVeque (1983)."""
+
+    def __init__(self, count: int, shape: tuple[int, ...]) -> None:
+        self.count, self.shape = count, shape
+        self.size = np.zeros(count)
+        self.known, self.mean, self.squares = np.zeros((3, count, int(np.prod(shape, dtype=int))))
+
+    def add(self, x: Array, groups: NDArray[np.intp]) -> None:
+        """Take in a block of values (samples, elements) and the group of each sample."""
+        self.size += np.bincount(groups, minlength=self.count)
+        for column in range(x.shape[1]):
             present = ~np.isnan(x[:, column])
-            group, part = groups[rows][present], x[present, column]
-            n = np.bincount(group, minlength=count).astype(np.float64)
-            m = _divide(np.bincount(group, part, count).astype(np.float64), n)
-            s = np.bincount(group, np.square(part - m[group]), count)
-            both = known[:, column] + n
-            delta = m - mean[:, column]
-            squares[:, column] += s + _divide(np.square(delta) * known[:, column] * n, both)
-            mean[:, column] += _divide(delta * n, both)
-            known[:, column] = both
-    if infinite:
-        raise not_finite(str(values.name), infinite, values.sizes["sample"], "it has no mean")
-    mean[known == 0] = np.nan
-    size = np.bincount(groups, minlength=count).astype(np.float64)
-    return Moments(size, *(part.reshape(count, *shape) for part in (known, mean, squares)))
+            group, part = groups[present], x[present, column]
+            n = np.bincount(group, minlength=self.count).astype(np.float64)
+            m = _divide(np.bincount(group, part, self.count).astype(np.float64), n)
+            s = np.bincount(group, np.square(part - m[group]), self.count)
+            known = self.known[:, column]
+            both = known + n
+            delta = m - self.mean[:, column]
+            self.squares[:, column] += s + _divide(np.square(delta) * known * n, both)
+            self.mean[:, column] += _divide(delta * n, both)
+            self.known[:, column] = both
+
+    def moments(self) -> Moments:
+        """Return the moments of all blocks so far."""
+        mean = np.where(self.known > 0, self.mean, np.nan)
+        parts = (part.reshape(self.count, *self.shape) for part in (self.known, mean, self.squares))
+        return Moments(self.size, *parts)
 
 
 def check_finite(name: str, values: Array, outputs: int, samples: int, why: str) -> None:

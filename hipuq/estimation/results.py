@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import SchemaError
+from hipuq.estimation.reduction import Groups, by_block, flag_counts, one_group, read
 from hipuq.inputs import Inputs
 from hipuq.intervals import combined
 
@@ -47,8 +50,8 @@ def kind_of(values: xr.DataArray) -> Kind:
     if role == schema.PROBABILITY:
         return Kind("probability", graded=True)
     if role is None and "units" not in values.attrs:
-        numbers = values.values.astype(np.float64)
-        if np.isin(numbers[~np.isnan(numbers)], (0.0, 1.0)).all():
+        # Of other numbers mostly the first block tells.
+        if all((np.isnan(part) | np.isin(part, (0, 1))).all() for part in by_block(values)):
             return Kind("probability")
     return Kind("mean")
 
@@ -79,8 +82,8 @@ def check_independent(outcomes: xr.Dataset, *, strata: bool = False) -> None:
         )
 
 
-def levels_of(outcomes: xr.Dataset, inputs: Inputs) -> tuple[xr.Dataset | None, NDArray[np.intp]]:
-    """Return the levels that outcomes of a stratified design are of, and the one of each sample.
+def levels_of(outcomes: xr.Dataset, inputs: Inputs) -> tuple[xr.Dataset | None, Groups]:
+    """Return the levels that outcomes of a stratified design are of, and what gives the one of each sample.
 
     Parameters
     ----------
@@ -92,26 +95,29 @@ def levels_of(outcomes: xr.Dataset, inputs: Inputs) -> tuple[xr.Dataset | None, 
     -------
     levels : Dataset or None
         None if the design was not stratified.
-    level : (samples,) array of int
-        Place of each sample's level, from 0.
+    level : callable
+        Rows -> place of each sample's level, from 0, which reads no others. It raises a SchemaError for
+        samples of other levels than those of the inputs.
     """
     if "weight" in outcomes.coords:
         for name in inputs.discrete:
             levels = inputs.levels(name)
-            dim = levels.attrs["dim"]
-            if dim in outcomes.coords:
-                place = levels.get_index(dim).get_indexer(outcomes[dim].values)
-                group = levels.attrs["group"]
-                other = (place < 0).any() or (
-                    group in outcomes.coords
-                    and not np.array_equal(levels[group].values[place], outcomes[group].values)
-                )
-                if other:
-                    raise SchemaError(
-                        f"the outcomes are of another {name} than the inputs: their {dim} does not fit"
-                    )
-                return levels, np.asarray(place, np.intp)
-    return None, np.zeros(outcomes.sizes["sample"], np.intp)
+            if levels.attrs["dim"] in outcomes.coords:
+                return levels, partial(_places, outcomes, levels, name)
+    return None, one_group
+
+
+def _places(outcomes: xr.Dataset, levels: xr.Dataset, name: str, rows: slice) -> NDArray[np.intp]:
+    """Return the place of the level of each sample among all levels."""
+    dim, group = levels.attrs["dim"], levels.attrs["group"]
+    numbers: Any = read(outcomes[dim], rows)
+    place = levels.get_index(dim).get_indexer(numbers)
+    if (place < 0).any() or (
+        group in outcomes.coords
+        and not np.array_equal(levels[group].values[place], read(outcomes[group], rows))
+    ):
+        raise SchemaError(f"the outcomes are of another {name} than the inputs: their {dim} does not fit")
+    return np.asarray(place, np.intp)
 
 
 def labelled(values: xr.DataArray, kind: Kind, arrays: Mapping[str, xr.DataArray]) -> xr.Dataset:
@@ -235,11 +241,11 @@ def finished(
     -------
     Dataset
     """
-    status = outcomes["status"].values if "status" in outcomes else np.zeros(outcomes.sizes["sample"])
+    found = flag_counts(outcomes["status"], schema.STATUS) if "status" in outcomes else {}
     counts = {
         "evaluations": (outcomes.sizes["sample"], "model evaluations", "1"),
-        "failed": (int((status == schema.STATUS["failed"]).sum()), "failed samples", "1"),
-        "undecided": (int((status == schema.STATUS["undecided"]).sum()), "undecided samples", "1"),
+        "failed": (found.get("failed", 0), "failed samples", "1"),
+        "undecided": (found.get("undecided", 0), "undecided samples", "1"),
         "seconds": (float(outcomes.attrs.get("seconds", np.nan)), "time of the evaluations", "s"),
     }
     for name, (value, long_name, units) in counts.items():

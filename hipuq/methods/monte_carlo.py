@@ -7,6 +7,8 @@ with contact patterns. Points that are not independent need replicates to show t
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -14,7 +16,7 @@ from numpy.typing import NDArray
 from hipuq import schema
 from hipuq.errors import InputError, check_name
 from hipuq.estimation.limits import columns
-from hipuq.estimation.reduction import moments
+from hipuq.estimation.reduction import Groups, Moments, by_block, one_group, read, reduced
 from hipuq.estimation.results import (
     ENDS,
     Kind,
@@ -233,11 +235,16 @@ def estimate(
     levels, level = levels_of(outcomes, inputs)
     strata = 1 if levels is None else levels.sizes[levels.attrs["dim"]]
     replicates, replicate = _replicates(outcomes)
-    cell = level * replicates + replicate
-    table, *bounds = (
-        moments(part, cell, strata * replicates).reshaped(strata, replicates)
-        for part in (values, *_bounds(outcomes, of))
-    )
+
+    def cell(rows: slice) -> NDArray[np.intp]:
+        return level(rows) * replicates + replicate(rows)
+
+    groupings = [(cell, strata * replicates)]
+    if levels is None and replicates == 1:
+        size = values.sizes["sample"]
+        groupings.append((_shell, int(_shell(slice(size - 1, size))[0]) + 1))
+    cells, *shells = reduced([values, *_bounds(outcomes, of, values.dims)], groupings)
+    table, *bounds = (part.reshaped(strata, replicates) for part in cells)
     if levels is not None and set(inputs) <= set(inputs.discrete):
         confidence = 1.0
     dims = ([] if levels is None else [levels.attrs["dim"]]) + [str(d) for d in values.dims[1:]]
@@ -252,7 +259,8 @@ def estimate(
         level_of_limits = confidence if independent else None
         results = with_summaries(results, levels, kind.quantity, arrays, level_of_limits)
     else:
-        parts = _by_budget(values, _bounds(outcomes, of), replicate, kind, confidence)
+        # Only whole replicates are designs of their own.
+        parts = _by_budget(values.dims[1:], shells[0] if shells else cells, bool(shells), kind, confidence)
         for (end, text), part in zip(ENDS.items(), parts.values(), strict=True):
             attrs = results[f"{kind.quantity}{end}"].attrs
             name = f"{attrs['long_name'].removesuffix(text)} after part of the samples{text}"
@@ -260,45 +268,58 @@ def estimate(
     return finished(results, outcomes, inputs, of=of, method="monte_carlo", confidence=confidence)
 
 
-def _replicates(outcomes: xr.Dataset) -> tuple[int, NDArray[np.intp]]:
-    """Return the number of replicates and the number of each sample's, from 0."""
-    if "replicate" not in outcomes.coords:
-        return 1, np.zeros(outcomes.sizes["sample"], np.intp)
-    names, replicate = np.unique(outcomes["replicate"].values, return_inverse=True)
-    return len(names), replicate.astype(np.intp)
+def _replicates(outcomes: xr.Dataset) -> tuple[int, Groups]:
+    """Return the number of replicates and what gives the number of each sample's, from 0."""
+    numbers = outcomes.coords.get("replicate")
+    if numbers is None or not numbers.dims:
+        return 1, one_group
+    names = np.unique(np.concatenate([np.unique(part) for part in by_block(numbers)]))
+    return len(names), lambda rows: np.searchsorted(names, read(numbers, rows))
 
 
-def _bounds(outcomes: xr.Dataset, of: str) -> list[xr.DataArray]:
+def _bounds(outcomes: xr.Dataset, of: str, dims: tuple[Hashable, ...]) -> list[xr.DataArray]:
     """Return the bounds of each sample's outcome, if the outcomes hold them."""
     names = [f"{of}_low", f"{of}_high"]
-    return [outcomes[name] for name in names] if all(name in outcomes for name in names) else []
+    return [outcomes[name].transpose(*dims) for name in names if all(end in outcomes for end in names)]
+
+
+def _shell(rows: slice) -> NDArray[np.intp]:
+    """Return the first budget that has each sample: `FIRST` samples, twice as many, and so on."""
+    return np.searchsorted(FIRST << np.arange(56), np.arange(rows.start, rows.stop) + 1)
 
 
 def _by_budget(
-    values: xr.DataArray, bounds: list[xr.DataArray], replicate: NDArray[np.intp], kind: Kind, level: float
+    dims: tuple[Hashable, ...], parts: list[Moments], pool: bool, kind: Kind, level: float
 ) -> dict[str, xr.DataArray]:
     """Return the estimate and its limits after a part of the samples: how it converges.
 
-    After each replicate, where there are several: only whole ones are designs of their own. Else after
-    `FIRST` samples, twice as many, and so on to all.
+    Parameters
+    ----------
+    dims : tuple
+        Those of the outcome besides ``sample``.
+    parts : list of Moments
+        Of the outcome and its bounds by the samples that each budget adds: a replicate or a shell.
+    pool : bool
+        Whether what was added is one sample; else replicates are told from each other.
+    kind : Kind
+    level : float
+
+    Returns
+    -------
+    dict of str to DataArray
+        ``estimate``, ``low`` and ``high`` over ``budget`` and `dims`.
     """
-    size = values.sizes["sample"]
-    if replicate.max() > 0:
-        shell = replicate
-    else:
-        shell = np.ceil(np.log2(np.maximum(np.arange(1, size + 1) / FIRST, 1.0))).astype(np.intp)
-    count = int(shell.max()) + 1
-    shells = [moments(part, shell, count) for part in (values, *bounds)]
+    count = len(parts[0].size)
     rows = []
     for k in range(1, count + 1):
-        first, *rest = (part.first(k).reshaped(1, k) for part in shells)
-        if replicate.max() == 0:
+        first, *rest = (part.first(k).reshaped(1, k) for part in parts)
+        if pool:
             first, *rest = (part.pooled().reshaped(1, 1) for part in (first, *rest))
         rows.append(columns(first, rest, kind, level))
-    budgets = ("budget", np.cumsum(shells[0].size).astype(np.int64), schema.COORDINATES["budget"].attrs)
+    budgets = ("budget", np.cumsum(parts[0].size).astype(np.int64), schema.COORDINATES["budget"].attrs)
     return {
-        name: xr.DataArray(
-            np.concatenate([row[name] for row in rows]), dims=["budget", *values.dims[1:]]
-        ).assign_coords(budget=budgets)
+        name: xr.DataArray(np.concatenate([row[name] for row in rows]), dims=["budget", *dims]).assign_coords(
+            budget=budgets
+        )
         for name in ("estimate", "low", "high")
     }

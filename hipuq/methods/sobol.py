@@ -276,7 +276,7 @@ def _of_order(second_order: bool | None, layout: Layout, table: Array) -> tuple[
             "second_order is True, but the design has no samples for pairs: design with second_order=True"
         )
     kept = [matrix in wanted.matrices for matrix in layout.matrices]
-    return wanted, table[:, :, kept]
+    return wanted, np.compress(kept, table, axis=2)
 
 
 def _resampling_seed(rng: Seed, outcomes: xr.Dataset) -> int:

@@ -17,7 +17,8 @@ EPS = float(np.finfo(np.float64).eps)
 
 def complete(table: Array) -> Array:
     """Return the blocks of an outcome, (blocks, width), of which every sample is known."""
-    return table[~np.isnan(table).any(axis=1)]
+    known = ~np.isnan(table).any(axis=1)
+    return table if known.all() else table[known]
 
 
 def base(table: Array) -> Array:
@@ -28,9 +29,14 @@ def base(table: Array) -> Array:
 def standardised(table: Array) -> Array:
     """Return outcomes with mean 0 and variance 1, as SALib does; 0 where they vary by rounding alone."""
     # Divided by the largest first, so that no square overflows or vanishes.
-    scaled = table / max(float(np.abs(table).max()), float(np.finfo(np.float64).tiny))
+    largest = max(float(table.max()), -float(table.min()))
+    scaled = table / max(largest, float(np.finfo(np.float64).tiny))
     spread = scaled.std()
-    return (scaled - scaled.mean()) / spread if spread > 16 * EPS else np.zeros_like(scaled)
+    if not spread > 16 * EPS:
+        return np.zeros_like(scaled)
+    scaled -= scaled.mean()
+    scaled /= spread
+    return scaled
 
 
 def reason(table: Array, minimum_events: int, verdict: bool) -> str:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import InputError, SchemaError
+from hipuq.estimation.reduction import read, slices
 from hipuq.inputs import Inputs
 
 Array = NDArray[np.float64]
@@ -101,12 +102,12 @@ class Layout:
         values : DataArray
             An outcome, ``sample`` first.
         outcomes : Dataset
-            With ``block``, ``matrix`` and, if there is one, ``status``.
+            With ``block`` and ``matrix``.
 
         Returns
         -------
         table : (outputs, blocks, width) array
-            By ascending number of the block. NaN where a sample is missing, failed or unknown.
+            By ascending number of the block. NaN where a sample is missing or unknown.
         samples : (blocks,) array of int
             Samples of each block.
 
@@ -115,23 +116,24 @@ class Layout:
         SchemaError
             If there are two samples for one place.
         """
-        matrix = _whole_numbers(outcomes, "matrix")
-        blocks, place = np.unique(_whole_numbers(outcomes, "block"), return_inverse=True)
-        filled = np.bincount(place * self.width + matrix, minlength=len(blocks) * self.width)
-        filled = filled.reshape(len(blocks), self.width)
+        size, outputs = values.sizes["sample"], int(np.prod(values.shape[1:], dtype=int))
+        named = [np.unique(_whole_numbers(outcomes, "block", rows)) for rows in slices(size)]
+        blocks = np.unique(np.concatenate(named))
+        table = np.full((outputs, len(blocks) * self.width), np.nan)
+        filled = np.zeros(len(blocks) * self.width, np.int32)
+        for rows in slices(size):
+            block, matrix = (_whole_numbers(outcomes, name, rows) for name in ("block", "matrix"))
+            place = np.searchsorted(blocks, block) * self.width + matrix
+            np.add.at(filled, place, 1)
+            table[:, place] = read(values, rows).reshape(-1, outputs).T
+        by_block = filled.reshape(len(blocks), self.width)
         if filled.max() > 1:
-            block, twice = np.argwhere(filled > 1)[0]
+            where, twice = np.argwhere(by_block > 1)[0]
             raise SchemaError(
-                f"block {blocks[block]} has several samples of the matrix {self.matrices[twice]!r}: the "
+                f"block {blocks[where]} has several samples of the matrix {self.matrices[twice]!r}: the "
                 "outcomes are of more than one design; analyse each by itself"
             )
-        flat = np.asarray(values.values, dtype=np.float64).reshape(len(matrix), -1)
-        if "status" in outcomes:
-            failed = outcomes["status"].values == schema.STATUS["failed"]
-            flat = np.where(failed[:, None], np.nan, flat)
-        table = np.full((flat.shape[1], len(blocks), self.width), np.nan)
-        table[:, place, matrix] = flat.T
-        return table, filled.sum(axis=1)
+        return table.reshape(outputs, len(blocks), self.width), by_block.sum(axis=1, dtype=np.int64)
 
 
 def check_flag(name: str, value: object) -> bool:
@@ -163,31 +165,31 @@ def layout_of(outcomes: xr.Dataset, inputs: Inputs) -> Layout:
                 f"the outcomes have no coord {name!r}: Sobol indices need outcomes of a design of the method "
                 "'sobol'; keep the coords block(sample) and matrix(sample) that it has"
             )
-    numbers = _whole_numbers(outcomes, "matrix")
-    _whole_numbers(outcomes, "block")
+    size = outcomes.sizes.get("sample", 0)
+    last = max(int(_whole_numbers(outcomes, "matrix", rows).max()) for rows in slices(size))
     both = (False, True)
     layouts = list(dict.fromkeys(Layout.of(inputs, not alone, pairs) for alone in both for pairs in both))
     meanings = outcomes["matrix"].attrs.get("flag_meanings")
     if meanings is None:
-        layouts = [layout for layout in layouts if layout.width == numbers.max() + 1]
+        layouts = [layout for layout in layouts if layout.width == last + 1]
         if len(layouts) > 1:
             raise SchemaError(
-                f"the {numbers.max() + 1} matrices of the outcomes may be for pairs of parameters or for "
+                f"the {last + 1} matrices of the outcomes may be for pairs of parameters or for "
                 "single elements: keep the attributes that 'matrix' has in the design"
             )
-        told = f"matrix is {numbers.max()} at most"
+        told = f"matrix is {last} at most"
     else:
         layouts = [layout for layout in layouts if " ".join(layout.matrices) == meanings]
         told = f"their matrices are {_shortened(str(meanings))}"
-    if not layouts or numbers.max() >= layouts[0].width:
+    if not layouts or last >= layouts[0].width:
         raise SchemaError(
             f"the outcomes are of other inputs than {', '.join(inputs)}: {told}; give those of the design"
         )
     return layouts[0]
 
 
-def _whole_numbers(outcomes: xr.Dataset, name: str) -> NDArray[np.int64]:
-    """Return a coord over the samples as integers.
+def _whole_numbers(outcomes: xr.Dataset, name: str, rows: slice) -> NDArray[np.int64]:
+    """Return some of a coord over the samples as integers.
 
     Raises
     ------
@@ -196,7 +198,7 @@ def _whole_numbers(outcomes: xr.Dataset, name: str) -> NDArray[np.int64]:
     """
     given = outcomes[name]
     if given.dims == ("sample",) and given.dtype.kind in "iuf":
-        numbers = given.values
+        numbers = read(given, rows)
         if (numbers >= 0).all() and (numbers == np.floor(numbers)).all() and np.isfinite(numbers).all():
             return numbers.astype(np.int64)
     raise SchemaError(

@@ -16,9 +16,13 @@ from numpy.typing import NDArray
 from hipuq.sampling import spawn
 
 Array = NDArray[np.float64]
+Places = NDArray[np.intp]
 
 CHUNK = 2**22
 """Draws that are held in memory at a time."""
+
+PIECE = 2**16
+"""Blocks whose products are held in memory at a time. Of more of them the sums are made piece by piece."""
 
 
 def multiplicities(seed: int, blocks: int, resamples: int, chunk: int = CHUNK) -> Iterator[Array]:
@@ -40,7 +44,8 @@ def multiplicities(seed: int, blocks: int, resamples: int, chunk: int = CHUNK) -
     step = max(1, chunk // blocks)
     for start in range(0, resamples, step):
         size = min(step, resamples - start)
-        drawn = rng.integers(blocks, size=(size, blocks)) + blocks * np.arange(size)[:, None]
+        drawn = rng.integers(blocks, size=(size, blocks))
+        drawn += blocks * np.arange(size)[:, None]
         yield np.bincount(drawn.ravel(), minlength=size * blocks).reshape(size, blocks).astype(np.float64)
 
 
@@ -63,9 +68,24 @@ def resampled(outcomes: Array, groups: int, times: Array, pairs: Sequence[tuple[
     (resamples, 2 groups + pairs) array
         NaN in a resample where A and B do not vary.
     """
-    a, ab, ba, b = split(outcomes, groups)
     j, k = (np.array([pair[i] for pair in pairs], np.intp) for i in (0, 1))
-    products = [
+    sums = np.zeros(1)
+    for start in range(0, len(outcomes), PIECE):
+        products = _products(outcomes[start : start + PIECE], groups, j, k)
+        sums = sums + times[:, start : start + PIECE] @ np.concatenate(products, axis=1)
+    ends = np.cumsum([part.shape[1] for part in products])[:-1]
+    centre, half, square, first, ab_a, total, both, ba_b = np.split(sums / len(outcomes), ends, axis=1)
+    variance = square - half**2
+    variance = np.where(variance > np.finfo(np.float64).eps, variance, np.nan)
+    first = (first - centre * ab_a) / variance
+    second = (both - centre * (ba_b[:, j] + ab_a[:, k])) / variance - first[:, j] - first[:, k]
+    return np.concatenate([first, total / variance, second], axis=1)
+
+
+def _products(outcomes: Array, groups: int, j: Places, k: Places) -> list[Array]:
+    """Return what means over the blocks are taken of, (blocks, columns) each."""
+    a, ab, ba, b = split(outcomes, groups)
+    return [
         # for the mean that indices are centred with, and for the variance
         outcomes.mean(axis=1)[:, None],
         ((a + b) / 2)[:, None],
@@ -78,14 +98,6 @@ def resampled(outcomes: Array, groups: int, times: Array, pairs: Sequence[tuple[
         ba[:, j] * ab[:, k] - (a * b)[:, None],
         ba - b[:, None],
     ]
-    means = times @ np.concatenate(products, axis=1) / len(outcomes)
-    ends = np.cumsum([part.shape[1] for part in products])[:-1]
-    centre, half, square, first, ab_a, total, both, ba_b = np.split(means, ends, axis=1)
-    variance = square - half**2
-    variance = np.where(variance > np.finfo(np.float64).eps, variance, np.nan)
-    first = (first - centre * ab_a) / variance
-    second = (both - centre * (ba_b[:, j] + ab_a[:, k])) / variance - first[:, j] - first[:, k]
-    return np.concatenate([first, total / variance, second], axis=1)
 
 
 def limits(

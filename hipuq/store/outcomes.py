@@ -9,6 +9,8 @@ from pathlib import Path
 import xarray as xr
 
 from hipuq.errors import StoreError
+from hipuq.store.blocks import complete, is_store
+from hipuq.store.ledger import ABOUT
 from hipuq.store.reporting import reported
 
 
@@ -29,7 +31,7 @@ def save_outcomes(outcomes: xr.Dataset, path: str | os.PathLike[str]) -> None:
     folder = Path(path)
     part, old = (folder.with_name(f".{folder.name}.hipuq-{end}") for end in ("part", "old"))
     with reported("write", folder):
-        if folder.exists() and not _is_store(folder):
+        if folder.exists() and not is_store(folder):
             raise StoreError(f"cannot write {folder}: something that is not a Zarr store is there")
         folder.parent.mkdir(parents=True, exist_ok=True)
         # A process that was killed may have left half of them.
@@ -64,7 +66,12 @@ def load_outcomes(path: str | os.PathLike[str]) -> xr.Dataset:
         If there is no such store, it cannot be read, or hipuq did not write it.
     """
     folder = Path(path)
-    if not _is_store(folder):
+    if (folder / ABOUT).is_file():
+        with reported("read", folder):
+            missing = complete(folder)
+        if missing:
+            raise StoreError(f"cannot read {folder}: {missing}; evaluate again with resume=True")
+    elif not is_store(folder):
         raise StoreError(f"there are no outcomes at {folder}: it is not a Zarr store")
     with reported("read", folder):
         outcomes = xr.open_zarr(folder, chunks=None, consolidated=True)
@@ -72,7 +79,3 @@ def load_outcomes(path: str | os.PathLike[str]) -> xr.Dataset:
         raise StoreError(f"{folder} is not a store of hipuq: it has no attribute hipuq_version")
     found: xr.Dataset = outcomes.drop_encoding()
     return found
-
-
-def _is_store(folder: Path) -> bool:
-    return (folder / ".zgroup").is_file() or (folder / "zarr.json").is_file()

@@ -11,6 +11,7 @@ from pathlib import Path
 import xarray as xr
 
 from hipuq.errors import StoreError
+from hipuq.store.inspecting import check_inside
 from hipuq.store.reporting import reported
 
 RESULTS_NAME = "results.nc"
@@ -36,6 +37,8 @@ def save_results(results: xr.DataTree | xr.Dataset, path: str | os.PathLike[str]
     part = file.with_name(file.name + ".part")
     with reported("write", file):
         file.parent.mkdir(parents=True, exist_ok=True)
+        # What is there may be a link to anything.
+        part.unlink(missing_ok=True)
         tree.to_netcdf(part, engine="h5netcdf")
         part.replace(file)
 
@@ -57,7 +60,9 @@ def add_results(groups: Mapping[str, xr.Dataset], path: str | os.PathLike[str]) 
     """
     file = Path(path)
     part = file.with_name(file.name + ".part")
+    check_ours(file)
     with reported("write", file):
+        part.unlink(missing_ok=True)
         shutil.copyfile(file, part)
         for name, dataset in groups.items():
             dataset.to_netcdf(part, mode="a", group=name, engine="h5netcdf")
@@ -80,7 +85,7 @@ def load_results(path: str | os.PathLike[str]) -> xr.DataTree:
     Raises
     ------
     StoreError
-        If there is no such file, it cannot be read, or hipuq did not write it.
+        If there is no such file, or as of `check_ours`.
     """
     file = Path(path)
     if file.is_dir():
@@ -89,17 +94,16 @@ def load_results(path: str | os.PathLike[str]) -> xr.DataTree:
         raise StoreError(
             f"there are no results at {file}: give an output folder of hipuq run, or its {RESULTS_NAME}"
         )
+    check_ours(file)
     with reported("read", file), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of files that are not netCDF, refused below
+        warnings.simplefilter("ignore")  # of files that are HDF5 and not netCDF
         with xr.open_datatree(file, engine="h5netcdf") as opened:
             tree = opened.load().copy()
-    if not any("hipuq_version" in node.attrs for node in tree.subtree):
-        raise StoreError(f"{file} is not a results file of hipuq: it has no attribute hipuq_version")
     return tree
 
 
 def check_ours(file: Path) -> None:
-    """Raise a StoreError unless a file is one of results that hipuq wrote; values are not read.
+    """Raise a StoreError unless a file is one of results that this hipuq can read; values are not read.
 
     Parameters
     ----------
@@ -108,14 +112,8 @@ def check_ours(file: Path) -> None:
     Raises
     ------
     StoreError
-        If it cannot be read, or another program wrote it.
+        If it cannot be read, another program or a later hipuq wrote it, it is too large, or it leads to other
+        files.
     """
-    import h5netcdf
-
-    with reported("read", file), h5netcdf.File(file, "r") as opened:
-        groups = [opened, *opened.groups.values()]
-        ours = any(
-            "hipuq_version" in one.attrs for group in groups for one in (group, *group.groups.values())
-        )
-    if not ours:
-        raise StoreError(f"{file} is not a results file of hipuq: it has no attribute hipuq_version")
+    with reported("read", file):
+        check_inside(file)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import reduce
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +11,15 @@ import xarray as xr
 
 from hipuq import schema
 from hipuq.combinations import at, gathered, points
-from hipuq.driver import completed, estimated, method_named
-from hipuq.evaluation import evaluate, together
+from hipuq.driver import DEFAULT, completed, estimated, method_named
+from hipuq.estimation.reduction import flag_counts
+from hipuq.evaluation import How, evaluate
 from hipuq.fragility_curve import fragility
 from hipuq.friction import FRICTION, OF_ANY_MODE, FrictionIntegrated
 from hipuq.friction_limits import friction_limit
 from hipuq.models import CEAModel
 from hipuq.occurring import frequency_ranges, verdict_counts
-from hipuq.store import load_outcomes, save_outcomes
+from hipuq.store import load_outcomes
 from hipuq.study.headline import DAMPING
 from hipuq.study.plan import Analysis
 from hipuq.study.tables import ReportTable
@@ -40,8 +41,7 @@ def analysed(
     seed: int,
     folder: Path,
     *,
-    n_jobs: int | None = None,
-    progress: bool | None = None,
+    how: How = DEFAULT,
     say: Callable[[str], None] = lambda line: None,
 ) -> Groups:
     """Return the results of an analysis; its outcomes are written.
@@ -53,8 +53,8 @@ def analysed(
     seed : int
     folder : Path
         Output folder of the study; gets ``outcomes/<analysis>.zarr``.
-    n_jobs, progress
-        As in `hipuq.evaluate`.
+    how : How
+        How to evaluate.
     say : callable, optional
         Gets a line about it.
 
@@ -65,39 +65,48 @@ def analysed(
         ``<analysis>/fragility``, ``onsets`` and ``friction_limit``, the last one of a sweep over friction
         too; where ``unstable`` is analysed ``<analysis>/frequencies``.
     """
-    method = method_named(analysis.method)
-    found: list[xr.Dataset] = []
+    method, store = method_named(analysis.method), outcomes_of(analysis, folder)
+    found = completed(
+        analysis.model,
+        analysis.inputs,
+        method,
+        analysis.n,
+        seed,
+        of=analysis.of,
+        stages=analysis.options,
+        at=points(analysis.over),
+        keep=_kept(analysis),
+        how=replace(how, store=store, replace=not how.resume),
+    )
     parts: dict[str, list[xr.Dataset]] = {}
-    for fixed in points(analysis.over):
-        outcomes = completed(
-            analysis.model,
-            analysis.inputs,
-            method,
-            analysis.n,
-            seed,
-            of=analysis.of,
-            stages=analysis.options,
-            fixed=fixed,
-            keep=_kept(analysis),
-            n_jobs=n_jobs,
-            progress=progress,
-        )
-        found.append(outcomes)
+    for outcomes in found:
         for of in analysis.of:
             results = estimated(method, outcomes, analysis.inputs, of=of, **analysis.options["estimate"])
             parts.setdefault(of, []).append(results)
         for name in _derived(analysis):
             parts.setdefault(name, []).append(DERIVED[name](analysis, report, outcomes))
-    whole = reduce(together, found)
-    save_outcomes(whole, folder / "outcomes" / f"{analysis.name}.zarr")
-    open_ = int((whole["status"] == schema.STATUS["undecided"]).sum())
-    say(
-        f"{analysis.name}: {whole.sizes['sample']:,} evaluations of {analysis.model.label} in "
-        f"{whole.attrs['seconds']:.1f} s, {open_:,} undecided"
-    )
+    _tell(analysis, load_outcomes(store), store, say)
     groups = {name: gathered(own, analysis.over) for name, own in parts.items()}
     groups |= _limits_of_a_sweep(analysis, report, groups)
     return {f"{analysis.name}/{name}": own for name, own in groups.items()}
+
+
+def outcomes_of(analysis: Analysis, folder: Path) -> Path:
+    """Return where in the output folder of a study the outcomes of an analysis lie."""
+    return folder / "outcomes" / f"{analysis.name}.zarr"
+
+
+def _tell(analysis: Analysis, whole: xr.Dataset, store: Path, say: Callable[[str], None]) -> None:
+    """Say how many samples were evaluated, and what became of them."""
+    counts = flag_counts(whole["status"], schema.STATUS)
+    line = (
+        f"{analysis.name}: {whole.sizes['sample']:,} evaluations of {analysis.model.label} in "
+        f"{whole.attrs['seconds']:.1f} s, {counts['undecided']:,} undecided"
+    )
+    if "failure_message" in whole:
+        row, message = (whole[name].values[0] for name in ("failed_sample", "failure_message"))
+        line += f", {counts['failed']:,} failed (sample {row}: {message}; all of them in {store})"
+    say(line)
 
 
 def _kept(analysis: Analysis) -> tuple[str, ...]:
@@ -195,9 +204,9 @@ def derived_again(
     own = {key.partition("/")[2]: group for key, group in before.items()}
     found: Groups = {} if "friction_limit" in own else _limits_of_a_sweep(analysis, report, own)
     missing = [name for name in _derived(analysis) if name not in own]
-    stored = folder / "outcomes" / f"{analysis.name}.zarr"
+    stored = outcomes_of(analysis, folder)
     if missing and stored.exists():
-        whole = load_outcomes(stored).load()
+        whole = load_outcomes(stored)
         for name in [name for name in missing if NEEDS.get(name, set()) <= set(whole.variables)]:
             parts = [DERIVED[name](analysis, report, one) for one in _by_value(whole, analysis)]
             found[name] = gathered(parts, analysis.over)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hipuq.contact import ContactPatterns
-from hipuq.errors import InputError, check_name
+from hipuq.errors import HipuqError, InputError, check_name
 from hipuq.friction import FRICTION, FrictionIntegrated, integrate_friction
 from hipuq.models import MODELS, CEAModel
 from hipuq.study.tables import InputTable
@@ -27,7 +27,9 @@ def model_of(options: Mapping[str, Any]) -> CEAModel:
     name = rest.pop("name")
     try:
         return MODELS[check_name("model", name, MODELS)](**rest)
-    except TypeError as error:
+    except HipuqError:
+        raise
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"model {name!r} does not take these options: {error}") from error
 
 

@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from hipuq.study.tables import NAME, InputTable, Table
+from hipuq.study.tables import FileName, InputTable, Table, Words
 
 Budgets = Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1)]
-ContenderName = Annotated[str, Field(pattern=r"^\S(.*\S)?$", max_length=60)]
+ContenderName = Annotated[Words, Field(pattern=r"^\S(.*\S)?$", max_length=60)]
 
 
 class ExactTable(Table):
@@ -139,8 +139,8 @@ class ProblemTable(Settings):
         All of them with a model of its own, else in place of the study's.
     """
 
-    name: str = Field(pattern=NAME, max_length=60)
-    title: str = ""
+    name: FileName
+    title: Words = ""
     contenders: list[str] | None = Field(default=None, min_length=1)
     model: dict[str, Any] = Field(default_factory=dict)
     inputs: dict[str, InputTable] = Field(default_factory=dict)

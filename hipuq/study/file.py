@@ -8,8 +8,9 @@ from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
-from hipuq.errors import StudyError, unknown_name
+from hipuq.errors import StoreError, StudyError, unknown_name
 from hipuq.evidence import LITERATURE
+from hipuq.store.reporting import check_plain_file, one_line
 from hipuq.study.compare_tables import (
     CompareTable,
     ContenderTable,
@@ -17,9 +18,12 @@ from hipuq.study.compare_tables import (
     ProblemTable,
     ResultsTable,
 )
-from hipuq.study.tables import AnalysisTable, InputTable, ReportTable, Table
+from hipuq.study.tables import AnalysisTable, InputTable, ReportTable, Table, Words
 
 MAXIMUM_BYTES = 1_000_000
+
+MAXIMUM_DEPTH = 20
+"""Most tables and lists within each other."""
 
 COMPARE = "compare"
 """Group of the comparisons in the results; no analysis may have its name."""
@@ -44,7 +48,7 @@ class StudyFile(Table):
     report : ReportTable
     """
 
-    title: str = Field(min_length=1)
+    title: Words = Field(min_length=1)
     description: str = ""
     seed: int = Field(default=0, ge=0, lt=2**63)
     model: dict[str, Any] = Field(default_factory=dict)
@@ -58,7 +62,9 @@ class StudyFile(Table):
         names = [entry.name for entry in self.analysis]
         if not names and self.compare is None:
             raise ValueError("there is nothing to run: give at least one [[analysis]], or [compare]")
-        twice = {name for name in names if names.count(name) > 1}
+        # Two names that differ in case alone would be one file on some systems.
+        lower = [name.lower() for name in names]
+        twice = [name for name in names if lower.count(name.lower()) > 1]
         if twice:
             raise ValueError(f"the name {min(twice)!r} is given to two analyses")
         if COMPARE in names:
@@ -87,32 +93,50 @@ def read_study_file(file: Path) -> tuple[str, StudyFile]:
         One line that names the file and the key.
     """
     try:
-        if file.stat().st_size > MAXIMUM_BYTES:
-            raise StudyError(f"{file} is larger than {MAXIMUM_BYTES} bytes: it is not a study file")
+        check_plain_file(file, MAXIMUM_BYTES)
         text = file.read_text(encoding="utf-8")
         data = tomllib.loads(text)
-        _check_integers(data)
+        _check_values(data)
+    except StoreError as error:
+        raise StudyError(f"cannot read the study: {error}; give a study folder or its study.toml") from error
     except OSError as error:
         raise StudyError(
             f"cannot read the study {file}: {error.strerror}; give a study folder or its study.toml"
         ) from error
-    except StudyError:
-        raise
     except (ValueError, RecursionError) as error:
-        raise StudyError(f"{file} is not a TOML file: {error}") from error
+        raise refused(f"{file} is not a TOML file: ", error) from error
     try:
         return text, StudyFile.model_validate(data)
     except ValidationError as error:
-        raise StudyError(f"{file}, {_first_line(error, data)}") from error
+        raise refused(f"{file}, ", _first_line(error, data)) from error
 
 
-def _check_integers(value: Any) -> None:
-    """Raise a ValueError for an integer beyond 64 bits: TOML has none, but tomllib takes them."""
+def refused(place: str, why: object) -> StudyError:
+    """Return the error of a study file that cannot be used: one line, whatever the file holds.
+
+    Parameters
+    ----------
+    place : str
+        The file and where in it, as the message begins.
+    why : object
+        What is wrong there.
+
+    Returns
+    -------
+    StudyError
+    """
+    return StudyError(f"{place}{one_line(str(why))}")
+
+
+def _check_values(value: Any, depth: int = 0) -> None:
+    """Raise a ValueError for what TOML does not have, but tomllib takes, and for what nobody writes."""
     if isinstance(value, int) and not -(2**63) <= value < 2**63:
         raise ValueError(f"the integer {str(value)[:20]}... does not fit into 64 bits")
+    if depth > MAXIMUM_DEPTH:
+        raise ValueError(f"it has more than {MAXIMUM_DEPTH} tables and lists within each other")
     parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
     for part in parts:
-        _check_integers(part)
+        _check_values(part, depth + 1)
 
 
 _NAMED: dict[tuple[str, ...], tuple[str, type[BaseModel]]] = {

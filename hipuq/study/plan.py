@@ -18,7 +18,7 @@ from hipuq.models import CEAModel
 from hipuq.models.oscillator_ring import OscillatorRing
 from hipuq.sampling import seed_of
 from hipuq.study.building import distributions_of, model_of, without_friction
-from hipuq.study.file import StudyFile, read_study_file
+from hipuq.study.file import StudyFile, read_study_file, refused
 from hipuq.study.headline import check_headline, damping_sweep, headline_of
 from hipuq.study.problems import Problem, problems_of
 from hipuq.study.tables import AnalysisTable, ReportTable
@@ -141,7 +141,7 @@ def load_study(path: str | os.PathLike[str], *, seed: int | None = None) -> Stud
         try:
             analyses.append(_analysis(table, entry))
         except HipuqError as error:
-            raise StudyError(f"{file}, analysis {entry.name!r}: {error}") from error
+            raise refused(f"{file}, analysis {entry.name!r}: ", error) from error
     try:
         check_headline(table, analyses)
         # What the study takes for its headline the report takes too.
@@ -149,11 +149,11 @@ def load_study(path: str | os.PathLike[str], *, seed: int | None = None) -> Stud
         if (swept := damping_sweep(table, analyses)) is not None:
             analyses.append(replace(_analysis(table, swept[0]), like=swept[1]))
     except HipuqError as error:
-        raise StudyError(f"{file}, report: {error}") from error
+        raise refused(f"{file}, report: ", error) from error
     try:
         problems = problems_of(table, file.parent)
     except HipuqError as error:
-        raise StudyError(f"{file}, {error}") from error
+        raise refused(f"{file}, ", error) from error
     try:
         chosen = table.seed if seed is None else seed_of(seed)
     except InputError as error:

@@ -11,6 +11,7 @@ from typing import Any
 import xarray as xr
 
 from hipuq.comparison import QUANTITIES, Reference, reference_from
+from hipuq.differences import difference
 from hipuq.driver import run as run_method
 from hipuq.driver import with_bounds
 from hipuq.errors import InputError, StudyError, check_name
@@ -21,7 +22,6 @@ from hipuq.models import CEAModel
 from hipuq.store import load_results
 from hipuq.study.building import without_friction
 from hipuq.study.compare_tables import ExactTable, ProblemTable, ResultsTable
-from hipuq.study.differences import difference
 
 INDICES = ("S1", "ST")
 """Results over ``parameter``."""

@@ -12,12 +12,14 @@ import xarray as xr
 
 from hipuq import __version__
 from hipuq.comparison.record import Record
+from hipuq.differences import difference
 from hipuq.errors import StoreError
 from hipuq.evidence import LITERATURE
 from hipuq.sampling import seed_of
 from hipuq.store import RESULTS_NAME, load_results
-from hipuq.study.analysing import Groups
-from hipuq.study.differences import difference
+from hipuq.store.blocks import progress_of
+from hipuq.store.ledger import ABOUT
+from hipuq.study.analysing import Groups, outcomes_of
 from hipuq.study.file import COMPARE
 from hipuq.study.plan import Analysis, Study
 from hipuq.study.problems import Problem
@@ -160,6 +162,14 @@ def would_keep(study: Study, folder: Path) -> list[str]:
     """
     before = earlier(study, folder)
     lines = [f"{name}: would be kept, complete in {folder}" for name in before.analyses]
+    for analysis in study.analyses:
+        store = outcomes_of(analysis, folder)
+        if analysis.name not in before.analyses and (store / ABOUT).is_file():
+            done, size = progress_of(store)
+            lines.append(
+                f"{analysis.name}: would go on, {done:,} of {size:,} samples are in {store}, "
+                f"{analysis.evaluations:,} asked for"
+            )
     for one in study.problems:
         runs = sum(len(own.sizes) * own.replicates for own in one.race.contenders)
         lines.append(f"{one.group}: {before.runs[one.name]:,} of {runs:,} runs would be kept")
@@ -195,8 +205,8 @@ def _analyses(study: Study, folder: Path, tree: xr.DataTree) -> dict[str, Groups
             str(name): node.to_dataset(inherit=False).drop_encoding()
             for name, node in tree.children[one.name].children.items()
         }
-        _check_same(one.name, before, asked[one.name], folder)
-        if set(one.of) <= set(groups):
+        same = _check_same(one.name, before, asked[one.name], folder)
+        if same and set(one.of) <= set(groups):
             wanted = {*one.of, *kept}
             found[one.name] = {f"{one.name}/{key}": own for key, own in groups.items() if key in wanted}
     return found
@@ -217,12 +227,20 @@ def _as_before(tree: xr.DataTree, study: Study) -> list[str]:
     ]
 
 
-def _check_same(name: str, before: Any, asked: dict[str, Any], folder: Path) -> None:
-    """Raise a StoreError if an analysis in the folder is not the one that the study asks for."""
+def _check_same(name: str, before: Any, asked: dict[str, Any], folder: Path) -> bool:
+    """Say whether an analysis in the folder is the one that the study asks for, False if it only has fewer n.
+
+    Raises
+    ------
+    StoreError
+        If it is another one.
+    """
     rest = "run without --resume, or choose another folder with --out"
     there = before.get(name) if isinstance(before, dict) else None
     try:
-        found = difference(there, asked)
+        # Outcomes of fewer samples are taken over.
+        fewer = isinstance(there, dict) and type(there.get("n")) is int and there["n"] < asked["n"]
+        found = difference(there | {"n": asked["n"]} if isinstance(there, dict) and fewer else there, asked)
     except RecursionError:
         there = None
     if there is None:
@@ -232,3 +250,4 @@ def _check_same(name: str, before: Any, asked: dict[str, Any], folder: Path) -> 
         raise StoreError(
             f"analysis {name!r} in {folder} was made with {place} {old}, the study asks for {new}: {rest}"
         )
+    return not fewer

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
 from hipuq import __version__
 from hipuq.errors import StoreError
+from hipuq.evaluation import MAX_FAILED, How
 from hipuq.evidence import FIGURES, LITERATURE, literature
 from hipuq.models.oscillator_ring import OscillatorRing
 from hipuq.store import RESULTS_NAME, add_results, check_ours, save_results, versions
-from hipuq.study.analysing import Groups, analysed, at_nominal, derived_again
+from hipuq.store.lock import locked
+from hipuq.study.analysing import Groups, analysed, at_nominal, derived_again, outcomes_of
 from hipuq.study.plan import Study
 from hipuq.study.resuming import DEFINITIONS, Earlier, analysis_seed, definitions, earlier
 
@@ -26,7 +31,10 @@ def run_study(
     *,
     resume: bool = False,
     n_jobs: int | None = None,
+    executor: Executor | str | Any = None,
     progress: bool | None = None,
+    on_error: str = "mark",
+    max_failed: float = MAX_FAILED,
     say: Callable[[str], None] = lambda line: None,
 ) -> xr.DataTree:
     """Run a study and write its outcomes and results.
@@ -37,13 +45,12 @@ def run_study(
     out : path
         Output folder; gets ``outcomes/<analysis>.zarr``, ``compare/<problem>.jsonl`` and ``results.nc``.
     resume : bool, default False
-        Whether to go on from what is in the folder: analyses that are complete and single runs of
-        comparisons are kept, so that the results are those of a run that was not cut off. Old results of
-        a comparison stay in the file until it is complete again.
-    n_jobs : int, optional
-        Threads; all cores by default.
-    progress : bool, optional
-        Whether to show progress bars; by default on a terminal.
+        Whether to go on from what is in the folder: analyses that are complete, outcomes of those that are
+        not, and single runs of comparisons are kept, so that the results are those of a run that was not
+        cut off; an analysis with a larger n takes the outcomes that are there. Old results of a comparison
+        stay in the file until it is complete again.
+    n_jobs, executor, progress, on_error, max_failed
+        As in `hipuq.evaluate`. Comparisons time their runs, so they take threads here whatever the executor.
     say : callable, optional
         Gets a line about each analysis, each budget of a comparison, and what the file no longer has.
 
@@ -63,12 +70,23 @@ def run_study(
         If the folder cannot be written, or what is to be kept in it was made in another way.
     """
     folder = Path(out)
+    how = How(n_jobs, executor, progress, on_error=on_error, max_failed=max_failed)
+    if resume:
+        how = replace(how, store=folder, resume=True)
     _check_writable(folder)
+    with locked(folder):
+        return _run(study, folder, how, say)
+
+
+def _run(study: Study, folder: Path, how: How, say: Callable[[str], None]) -> xr.DataTree:
+    resume, n_jobs, progress = how.resume, how.n_jobs, how.progress
     before = earlier(study, folder) if resume else Earlier()
     problems = [problem.rehearsed(n_jobs) for problem in study.problems]
     for name, why in before.dropped.items():
         say(f"{name}: dropped from {folder / RESULTS_NAME}, {why}")
     old = [] if resume else [one.store(folder) for one in problems]
+    # The first analysis replaces its own outcomes.
+    old += [] if resume else [outcomes_of(one, folder) for one in study.analyses[1:]]
     names = ["/", LITERATURE, *(one.name for one in study.analyses), *(one.group for one in problems)]
     groups = _root(study) | before.comparisons | _literature(study)
     results = _Results(folder, names, groups, old)
@@ -82,7 +100,7 @@ def run_study(
             say(f"{analysis.name}: kept, complete in {folder}")
             continue
         seed = analysis_seed(study, i)
-        found = analysed(analysis, study.report, seed, folder, n_jobs=n_jobs, progress=progress, say=say)
+        found = analysed(analysis, study.report, seed, folder, how=how, say=say)
         results.add(found | at_nominal(analysis, study.report, n_jobs, {}))
     results.give_way()
     for problem in problems:
@@ -123,12 +141,15 @@ class _Results:
             add_results(found, self.folder / RESULTS_NAME)
 
     def give_way(self) -> None:
-        """Remove runs of comparisons that belong to older results."""
-        for file in self.old:
+        """Remove runs of comparisons and outcomes that belong to older results."""
+        for path in self.old:
             try:
-                file.unlink(missing_ok=True)
+                if path.is_dir():
+                    shutil.rmtree(path)
+                else:
+                    path.unlink(missing_ok=True)
             except OSError as error:
-                raise StoreError(f"cannot remove {file}: {error.strerror}") from error
+                raise StoreError(f"cannot remove {path}: {error.strerror}") from error
         self.old = []
 
     def tree(self) -> xr.DataTree:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator
 
 from hipuq.contact import ContactPatterns
 from hipuq.distributions import DISTRIBUTIONS, from_table
@@ -16,6 +16,30 @@ CONTACT_PATTERNS = "contact_patterns"
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]*$"
 """What an analysis or a problem may be called: its group and its files are."""
+
+
+_PORTS = (f"{port}{number}" for port in ("com", "lpt") for number in range(10))
+
+DEVICES = frozenset(["con", "prn", "aux", "nul", *_PORTS])
+"""Names that no file can have on Windows."""
+
+
+def _not_a_device(name: str) -> str:
+    if name.lower() in DEVICES:
+        raise ValueError(f"{name!r} is no name for files on every system: take another one")
+    return name
+
+
+def _in_print(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError(f"{text[:60]!r} has characters that cannot be printed, or more than one line")
+    return text
+
+
+FileName = Annotated[str, Field(pattern=NAME, max_length=60), AfterValidator(_not_a_device)]
+
+Words = Annotated[str, AfterValidator(_in_print)]
+"""Text that is shown on a terminal as it is."""
 
 
 class Table(BaseModel):
@@ -105,7 +129,7 @@ class AnalysisTable(Table):
         What this analysis has in place of the study's.
     """
 
-    name: str = Field(pattern=NAME, max_length=60)
+    name: FileName
     method: str
     n: int = Field(ge=1)
     integrate_friction: bool = False

@@ -160,7 +160,8 @@ def divided(outcomes: xr.Dataset, inputs: Inputs, held_out: float, seed: int) ->
     """
     check_share(held_out)
     size = outcomes.sizes["sample"]
-    levels, place = levels_of(outcomes, inputs)
+    levels, level_of = levels_of(outcomes, inputs)
+    place = level_of(slice(0, size))
     share = np.ones(1) if levels is None else levels["weight"].values
     stratum, weight = np.full(size, FIT), np.zeros(size)
     rng = spawn(seed, FIRST_KEY, 2)

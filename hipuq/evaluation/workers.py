@@ -1,0 +1,183 @@
+"""Who evaluates: threads, processes, any executor, a dask cluster; answers come in the order of the calls."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from hipuq.errors import HipuqError, InputError, ModelError
+from hipuq.sampling import check_count
+
+EXECUTORS = ("threads", "processes")
+"""Executors by name."""
+
+T = TypeVar("T")
+K = TypeVar("K")
+
+
+@dataclass(frozen=True)
+class Workers:
+    """What runs the calls.
+
+    Attributes
+    ----------
+    executor : Executor
+    count : int
+        How many calls run at a time, as far as it can be told.
+    """
+
+    executor: Executor
+    count: int
+
+    def in_order(
+        self, calls: Iterable[tuple[K, Callable[..., T], tuple[Any, ...]]], ahead: int
+    ) -> Iterator[tuple[K, T]]:
+        """Yield what calls give, in their order.
+
+        Parameters
+        ----------
+        calls : iterable of (key, function, arguments)
+            Taken when there is room, so it may make the arguments when it is asked.
+        ahead : int
+            Calls that are handed over and not yet yielded, at most.
+
+        Raises
+        ------
+        ModelError
+            If it is the executor that fails.
+        """
+        waiting: deque[tuple[K, Future[T]]] = deque()
+        try:
+            for key, function, arguments in calls:
+                waiting.append((key, self._submitted(function, arguments)))
+                if len(waiting) >= ahead:
+                    first, future = waiting.popleft()
+                    yield first, _result(future)
+            while waiting:
+                first, future = waiting.popleft()
+                yield first, _result(future)
+        finally:
+            for _, future in waiting:
+                future.cancel()
+
+    def now(self, function: Callable[..., T], *arguments: Any) -> T:
+        """Return what one call gives."""
+        return _result(self._submitted(function, arguments))
+
+    def _submitted(self, function: Callable[..., T], arguments: tuple[Any, ...]) -> Future[T]:
+        try:
+            return self.executor.submit(function, *arguments)
+        except Exception as error:
+            raise _broken(error) from error
+
+
+def _result(future: Future[T]) -> T:
+    try:
+        return future.result()
+    except (HipuqError, MemoryError):
+        raise
+    except (Exception, CancelledError) as error:
+        # What the model raises is an answer: this is of the executor.
+        raise _broken(error) from error
+
+
+def _broken(error: BaseException) -> ModelError:
+    if isinstance(error, BrokenProcessPool):
+        return ModelError(
+            "a worker process ended before its time: it was killed, or the script that started it has no "
+            "if __name__ == '__main__': around what it runs; samples that are complete in a store stay"
+        )
+    text = " ".join(str(error).split()) or "no more is known"
+    return ModelError(f"the executor failed, {type(error).__name__}: {text[:300]}")
+
+
+@contextmanager
+def workers(executor: Any, n_jobs: int | None) -> Iterator[Workers]:
+    """Give what runs the calls, with one BLAS thread each: the matrices are small.
+
+    Parameters
+    ----------
+    executor : None, str, Executor or Client
+        None and ``"threads"`` are threads here, ``"processes"`` processes; a client of dask gives its
+        executor.
+    n_jobs : int or None
+        How many; all cores by default.
+
+    Raises
+    ------
+    InputError
+        If it is none of them.
+    """
+    jobs = (os.cpu_count() or 1) if n_jobs is None else check_count("n_jobs", n_jobs)
+    if executor is None or executor in ("threads", "processes"):
+        pool: Executor = _processes(jobs) if executor == "processes" else ThreadPoolExecutor(jobs)
+        with _own(pool), _one_thread():
+            yield Workers(pool, jobs)
+        return
+    count = getattr(executor, "_max_workers", None)
+    if callable(getattr(executor, "get_executor", None)):
+        count = sum(executor.ncores().values())
+        executor = executor.get_executor()
+    if not callable(getattr(executor, "submit", None)):
+        raise InputError(
+            f"executor is {executor!r}: it must be 'threads', 'processes', a concurrent.futures.Executor "
+            "or a client of dask.distributed"
+        )
+    with _one_thread():
+        yield Workers(executor, count if isinstance(count, int) and count > 0 else jobs)
+
+
+def _one_thread() -> Any:
+    from threadpoolctl import threadpool_limits
+
+    return threadpool_limits(1, "blas")
+
+
+@contextmanager
+def _own(pool: Executor) -> Iterator[None]:
+    """Shut a pool down, and do not wait for what is queued when something went wrong."""
+    try:
+        yield
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _processes(jobs: int) -> ProcessPoolExecutor:
+    # A fork would copy locks that other threads hold.
+    method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+    context = multiprocessing.get_context(method)
+    return ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin)
+
+
+def check_travels(model: object) -> None:
+    """Raise an InputError unless a model can be sent to another process."""
+    try:
+        pickle.dumps(model)
+    except Exception as error:
+        raise InputError(
+            f"the model cannot be sent to another process ({error}): define it at the top level of a "
+            "module, or take executor='threads'"
+        ) from error
+
+
+def _begin() -> None:
+    """Make a worker process end with the one that started it, and leave Ctrl-C to that."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: Any) -> None:
+    parent.join()
+    os._exit(1)
