@@ -15,7 +15,7 @@ settings.load_profile("hipuq")
 
 
 def pytest_collection_finish(session):
-    """Have the garbage collector leave alone what all tests share, and come less often: a tenth of the time."""
+    """Have the garbage collector leave alone what all tests share, and come less often: it is dear."""
     gc.collect()
     gc.freeze()
     gc.set_threshold(100_000)

@@ -27,19 +27,21 @@ def smooth(samples: xr.Dataset) -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def race() -> xr.Dataset:
+    """Return 24 replicates of those whose spread is judged, few of the others."""
+    few = {name: CONTENDERS[name] | {"replicates": 3} for name in ("latin hypercube", "chaos")}
+    contenders = CONTENDERS | few
     return compare(
-        smooth, INPUTS, CONTENDERS, of="y", reference=7 / 12, budgets=[64, 256, 1024], replicates=24, rng=1
+        smooth, INPUTS, contenders, of="y", reference=7 / 12, budgets=[64, 256, 1024], replicates=24, rng=1
     )
 
 
 def test_errors_fall_as_they_should(race):
-    """Monte Carlo as n**-1/2; a latin hypercube and Sobol points of a smooth function faster."""
+    """Monte Carlo as n**-1/2; Sobol points of a smooth function faster."""
     slope = {
         name: np.polyfit(
             np.log(race["evaluations"].loc[{"method": name}]), np.log(race["rmse"].loc[{"method": name}]), 1
         )[0]
-        for name in CONTENDERS
-        if name != "chaos"
+        for name in ("random", "Sobol points")
     }
     assert slope["random"] == pytest.approx(-0.5, abs=0.15)
     # Owen scrambled points of a smooth function: n**-3/2, up to logarithms.
@@ -99,7 +101,7 @@ def test_indices_too_can_be_compared():
         quantity="ST",
         reference=known.total,
         budgets=[320, 1280],
-        replicates=4,
+        replicates=2,
         rng=0,
     )
     assert race["rmse"].dims == ("method", "budget", "parameter")

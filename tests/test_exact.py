@@ -194,6 +194,8 @@ n = 1
 integrate_friction = true
 options = { stratify = "contact" }
 of = ["probability", "probability_by_mode"]
+[report]
+damping_samples = 0
 """
 )
 

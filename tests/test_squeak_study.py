@@ -42,7 +42,8 @@ def out(tmp_path_factory):
         }
         small.append(replace(one, n=SIZES[one.name], over=over))
     folder = tmp_path_factory.mktemp("work") / "results" / "squeak_report"
-    hipuq.run_study(replace(whole, analyses=tuple(small)), folder, progress=False)
+    report = whole.report.model_copy(update={"friction_points": 21})
+    hipuq.run_study(replace(whole, analyses=tuple(small), report=report), folder, progress=False)
     return folder
 
 

@@ -65,6 +65,11 @@ def _from_chaospy(value: Any, name: str) -> Distribution:
             f"{name} is {value!r}, whose probabilities do not add up to 1 in chaospy: it truncates rightly "
             "at one end only, so nest two, Trunc(Trunc(..., lower=a), upper=b), or take TruncNormal"
         )
+    if not np.array_equal(_chaospy.ppf(value, PROBES), _chaospy.ppf(value, PROBES)):
+        raise InputError(
+            f"{name} is {value!r}, whose quantiles chaospy draws anew at each call: take hipuq.mixture of "
+            "normal distributions"
+        )
     try:
         description = {"kind": "chaospy", **_chaospy.to_dict(value)}
         again = _chaospy.from_dict(description)

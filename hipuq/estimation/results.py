@@ -75,7 +75,9 @@ def check_independent(outcomes: xr.Dataset, *, strata: bool = False) -> None:
             "the outcomes are of a Sobol design, whose samples share values: take those of one matrix, "
             "outcomes.isel(sample=outcomes.matrix == 0).drop_vars(['block', 'matrix'])"
         )
-    if not strata and "stratum" in outcomes.coords and (outcomes["stratum"].values != 0).any():
+    if strata or "stratum" not in outcomes.coords:
+        return
+    if any((part != 0).any() for part in by_block(outcomes["stratum"])):
         raise SchemaError(
             "the outcomes are of a design of polynomial chaos, whose samples are no plain draws of the "
             "inputs: take those held out, outcomes.isel(sample=outcomes.stratum == 0)"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 from collections.abc import Callable, Hashable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
@@ -42,8 +43,8 @@ class Call:
         Outcomes wanted; None for all.
     on_error : str
         One of `ON_ERROR`.
-    home : int or None
-        Process in which threads are looked after already; None where they never are.
+    home : tuple or None
+        Machine and process in which threads are looked after already; None where they never are.
     layout : Layout or None
         What the outputs of other samples look like.
     """
@@ -51,7 +52,7 @@ class Call:
     model: Model
     keep: tuple[str, ...] | None
     on_error: str = MARK
-    home: int | None = None
+    home: tuple[str, int] | None = None
     layout: Layout | None = None
 
 
@@ -142,6 +143,9 @@ class _Asked:
 
     def _failed(self, place: int, error: BaseException) -> None:
         text = " ".join(str(error).split())
+        if isinstance(error, InputError):
+            # The model saw this one alone.
+            text = text.replace(" in sample 0", "", 1)
         # Messages of our own and of what was given back say what is wrong without a name of an error.
         plain = isinstance(error, (HipuqError, _FaultError))
         message = text if plain and text else f"{type(error).__name__}: {text}".removesuffix(": ")
@@ -264,9 +268,14 @@ def _shortened(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
 
 
-def _one_thread(home: int | None) -> Any:
+def here() -> tuple[str, int]:
+    """Return machine and process."""
+    return platform.node(), os.getpid()
+
+
+def _one_thread(home: tuple[str, int] | None) -> Any:
     """Return a context with one thread of BLAS, where the process that asks has not seen to it."""
-    if home is None or home == os.getpid():
+    if home is None or home == here():
         return nullcontext()
     from threadpoolctl import threadpool_limits
 

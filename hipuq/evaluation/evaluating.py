@@ -17,7 +17,7 @@ import xarray as xr
 from hipuq import __version__, schema
 from hipuq.designs import Design, as_design
 from hipuq.errors import InputError, check_name, unknown_name
-from hipuq.evaluation.calling import MARK, ON_ERROR, Call, Model
+from hipuq.evaluation.calling import MARK, ON_ERROR, Call, Model, here
 from hipuq.evaluation.stream import Limit, Stream, Unit, undecided_in
 from hipuq.evaluation.workers import check_travels, workers
 from hipuq.progress import progress_bar
@@ -208,6 +208,7 @@ class _Run:
         if target.complete:
             return
         with self._stream(sum(unit.lost for unit in target.units.values()), target.done) as stream:
+            stream.advance(0, failed=len(target.failures), undecided=target.undecided)
             if (example := target.example(self.design.rows(0, 1))) is not None:
                 stream.learn(example)
             wanted = [(number, target.rows(number)) for number in target.open_units]
@@ -224,7 +225,7 @@ class _Run:
             workers(how.executor, how.n_jobs) as staff,
             progress_bar("samples", size, how.progress, done=done) as advance,
         ):
-            call = Call(self.model, self.keep, how.on_error, os.getpid())
+            call = Call(self.model, self.keep, how.on_error, here())
             limit = Limit(how.max_failed, size, failed, done - failed)
             yield Stream(call, self.design, staff, self.block, limit, advance)
 

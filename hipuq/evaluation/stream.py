@@ -150,8 +150,7 @@ class Stream:
         # Until a sample has succeeded nobody knows what outputs look like.
         waiting: list[Unit] = []
         blocks = self._blocks(wanted, reuse)
-        ahead = max(4 * self.workers.count, 2)
-        for (unit, places), answer in self.workers.in_order(blocks, ahead):
+        for (unit, places), answer in self.workers.in_order(blocks):
             if places is not None and answer is not None:
                 self._take(unit, places, answer)
             unit.left -= 1

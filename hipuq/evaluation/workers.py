@@ -7,6 +7,7 @@ import os
 import pickle
 import signal
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
@@ -21,6 +22,12 @@ from hipuq.sampling import check_count
 EXECUTORS = ("threads", "processes")
 """Executors by name."""
 
+AHEAD = 4
+"""Calls for each worker that are handed over and not yet back."""
+
+LOOK = 5.0
+"""Seconds after which a cluster is asked again how large it is."""
+
 T = TypeVar("T")
 K = TypeVar("K")
 
@@ -32,24 +39,20 @@ class Workers:
     Attributes
     ----------
     executor : Executor
-    count : int
-        How many calls run at a time, as far as it can be told.
+    count : callable
+        Says how many calls run at a time now, as far as it can be told.
     """
 
     executor: Executor
-    count: int
+    count: Callable[[], int]
 
-    def in_order(
-        self, calls: Iterable[tuple[K, Callable[..., T], tuple[Any, ...]]], ahead: int
-    ) -> Iterator[tuple[K, T]]:
+    def in_order(self, calls: Iterable[tuple[K, Callable[..., T], tuple[Any, ...]]]) -> Iterator[tuple[K, T]]:
         """Yield what calls give, in their order.
 
         Parameters
         ----------
         calls : iterable of (key, function, arguments)
             Taken when there is room, so it may make the arguments when it is asked.
-        ahead : int
-            Calls that are handed over and not yet yielded, at most.
 
         Raises
         ------
@@ -60,7 +63,7 @@ class Workers:
         try:
             for key, function, arguments in calls:
                 waiting.append((key, self._submitted(function, arguments)))
-                if len(waiting) >= ahead:
+                if len(waiting) >= AHEAD * self.count():
                     first, future = waiting.popleft()
                     yield first, _result(future)
             while waiting:
@@ -97,6 +100,11 @@ def _broken(error: BaseException) -> ModelError:
             "a worker process ended before its time: it was killed, or the script that started it has no "
             "if __name__ == '__main__': around what it runs; samples that are complete in a store stay"
         )
+    if isinstance(error, CancelledError):
+        return ModelError(
+            "the executor gave up: it was shut down, or the connection to the scheduler of its cluster is "
+            "lost; samples that are complete in a store stay"
+        )
     text = " ".join(str(error).split()) or "no more is known"
     return ModelError(f"the executor failed, {type(error).__name__}: {text[:300]}")
 
@@ -119,22 +127,39 @@ def workers(executor: Any, n_jobs: int | None) -> Iterator[Workers]:
         If it is none of them.
     """
     jobs = (os.cpu_count() or 1) if n_jobs is None else check_count("n_jobs", n_jobs)
-    if executor is None or executor in ("threads", "processes"):
+    if executor is None or executor in EXECUTORS:
         pool: Executor = _processes(jobs) if executor == "processes" else ThreadPoolExecutor(jobs)
         with _own(pool), _one_thread():
-            yield Workers(pool, jobs)
+            yield Workers(pool, lambda: jobs)
         return
-    count = getattr(executor, "_max_workers", None)
+    given = getattr(executor, "_max_workers", None)
+    threads = given if isinstance(given, int) and given > 0 else jobs
+
+    def count() -> int:
+        return threads
+
     if callable(getattr(executor, "get_executor", None)):
-        count = sum(executor.ncores().values())
-        executor = executor.get_executor()
+        count, executor = _cores(executor), executor.get_executor()
     if not callable(getattr(executor, "submit", None)):
         raise InputError(
             f"executor is {executor!r}: it must be 'threads', 'processes', a concurrent.futures.Executor "
             "or a client of dask.distributed"
         )
     with _one_thread():
-        yield Workers(executor, count if isinstance(count, int) and count > 0 else jobs)
+        yield Workers(executor, count)
+
+
+def _cores(client: Any) -> Callable[[], int]:
+    """Return what says how many cores a cluster has: workers may come and go."""
+    found, asked = 1, -LOOK
+
+    def count() -> int:
+        nonlocal found, asked
+        if (now := time.monotonic()) - asked >= LOOK:
+            found, asked = max(1, sum(client.ncores().values())), now
+        return found
+
+    return count
 
 
 def _one_thread() -> Any:

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.errors import InputError, check_name
+from hipuq.estimation.budgets import by_budget, shell, shells_of
 from hipuq.estimation.limits import columns
-from hipuq.estimation.reduction import Groups, Moments, by_block, one_group, read, reduced
+from hipuq.estimation.reduction import Groups, by_block, one_group, read, reduced
 from hipuq.estimation.results import (
     ENDS,
     Kind,
@@ -41,9 +42,6 @@ from hipuq.sampling import (
 )
 
 Array = NDArray[np.float64]
-
-FIRST = 64
-"""Samples after which convergence is first told."""
 
 REPLICATES = {"random": 1, "latin_hypercube": 8, "sobol": 8}
 """Replicates by sampler where none are asked for: what its own error bar needs."""
@@ -241,8 +239,7 @@ def estimate(
 
     groupings = [(cell, strata * replicates)]
     if levels is None and replicates == 1:
-        size = values.sizes["sample"]
-        groupings.append((_shell, int(_shell(slice(size - 1, size))[0]) + 1))
+        groupings.append((shell, shells_of(values.sizes["sample"])))
     cells, *shells = reduced([values, *_bounds(outcomes, of, values.dims)], groupings)
     table, *bounds = (part.reshaped(strata, replicates) for part in cells)
     if levels is not None and set(inputs) <= set(inputs.discrete):
@@ -260,7 +257,7 @@ def estimate(
         results = with_summaries(results, levels, kind.quantity, arrays, level_of_limits)
     else:
         # Only whole replicates are designs of their own.
-        parts = _by_budget(values.dims[1:], shells[0] if shells else cells, bool(shells), kind, confidence)
+        parts = by_budget(values.dims[1:], shells[0] if shells else cells, bool(shells), kind, confidence)
         for (end, text), part in zip(ENDS.items(), parts.values(), strict=True):
             attrs = results[f"{kind.quantity}{end}"].attrs
             name = f"{attrs['long_name'].removesuffix(text)} after part of the samples{text}"
@@ -281,45 +278,3 @@ def _bounds(outcomes: xr.Dataset, of: str, dims: tuple[Hashable, ...]) -> list[x
     """Return the bounds of each sample's outcome, if the outcomes hold them."""
     names = [f"{of}_low", f"{of}_high"]
     return [outcomes[name].transpose(*dims) for name in names if all(end in outcomes for end in names)]
-
-
-def _shell(rows: slice) -> NDArray[np.intp]:
-    """Return the first budget that has each sample: `FIRST` samples, twice as many, and so on."""
-    return np.searchsorted(FIRST << np.arange(56), np.arange(rows.start, rows.stop) + 1)
-
-
-def _by_budget(
-    dims: tuple[Hashable, ...], parts: list[Moments], pool: bool, kind: Kind, level: float
-) -> dict[str, xr.DataArray]:
-    """Return the estimate and its limits after a part of the samples: how it converges.
-
-    Parameters
-    ----------
-    dims : tuple
-        Those of the outcome besides ``sample``.
-    parts : list of Moments
-        Of the outcome and its bounds by the samples that each budget adds: a replicate or a shell.
-    pool : bool
-        Whether what was added is one sample; else replicates are told from each other.
-    kind : Kind
-    level : float
-
-    Returns
-    -------
-    dict of str to DataArray
-        ``estimate``, ``low`` and ``high`` over ``budget`` and `dims`.
-    """
-    count = len(parts[0].size)
-    rows = []
-    for k in range(1, count + 1):
-        first, *rest = (part.first(k).reshaped(1, k) for part in parts)
-        if pool:
-            first, *rest = (part.pooled().reshaped(1, 1) for part in (first, *rest))
-        rows.append(columns(first, rest, kind, level))
-    budgets = ("budget", np.cumsum(parts[0].size).astype(np.int64), schema.COORDINATES["budget"].attrs)
-    return {
-        name: xr.DataArray(np.concatenate([row[name] for row in rows]), dims=["budget", *dims]).assign_coords(
-            budget=budgets
-        )
-        for name in ("estimate", "low", "high")
-    }

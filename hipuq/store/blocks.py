@@ -25,6 +25,9 @@ from hipuq.store.reuse import Reuse
 UNITS, BLOCKS = 64, 64
 """A store has about so many units, but none of more blocks of the model than this."""
 
+ATTRS = "hipuq.attrs.json"
+"""Attributes as xarray wrote them at first: the last ones replace them, and could be cut off."""
+
 END = -1
 """Number of the unit that holds what is written at the end."""
 
@@ -78,6 +81,11 @@ class BlockStore:
     def failures(self) -> dict[int, str]:
         """Row of each failed sample -> message, in order."""
         return dict(sorted(pair for unit in self.units.values() for pair in unit.failures.items()))
+
+    @property
+    def undecided(self) -> int:
+        """Number of undecided samples."""
+        return sum(unit.undecided for unit in self.units.values())
 
     @property
     def seconds(self) -> float:
@@ -201,7 +209,8 @@ class BlockStore:
                     shutil.rmtree(self.folder / name, ignore_errors=True)
                 with quiet():
                     table.to_zarr(self.folder, mode="a", zarr_format=2, consolidated=False)
-            zarr.open_group(self.folder, mode="r+", zarr_format=2).attrs.update(attrs)
+            whole = json.loads((self.folder / ATTRS).read_text()) | dict(attrs)
+            (self.folder / ".zattrs").write_text(json.dumps(whole, indent=1))
             with quiet():
                 zarr.consolidate_metadata(str(self.folder), zarr_format=2)
             unit = Unit(
@@ -222,14 +231,12 @@ class BlockStore:
         if not any(number != END for number in self.units):
             clear(self.folder)
             self._make(outcomes, names)
-        group = zarr.open_group(self.folder, mode="r+", zarr_format=2)
+        group = _group(self.folder)
         # Chunks that hold nothing but zeros or NaN are written too: what is not there is known to be missing.
         with zarr.config.set({"array.write_empty_chunks": True}):
             self._arrays = {name: group[name] for name in names}
 
     def _make(self, outcomes: xr.Dataset, names: list[str]) -> None:
-        import zarr
-
         encoding = {}
         for name in names:
             values = outcomes[name]
@@ -239,13 +246,17 @@ class BlockStore:
         empty = empty.drop_attrs(deep=False).drop_encoding()
         with quiet():
             empty.to_zarr(self.folder, mode="a", zarr_format=2, consolidated=False, encoding=encoding)
-        group: Any = zarr.open_group(self.folder, mode="r+", zarr_format=2)
+        group = _group(self.folder)
         for name in names:
             shape = [self.size if dim == "sample" else n for dim, n in outcomes[name].sizes.items()]
             group[name].resize(tuple(shape))
         if self.labels.variables:
             with quiet():
                 self.labels.to_zarr(self.folder, mode="a", zarr_format=2, consolidated=False)
+        attrs = dict(group.attrs)
+        # Where xarray looks for coordinates that no variable names.
+        coordinates = [str(attrs.get("coordinates", "")), *map(str, self.labels.variables)]
+        (self.folder / ATTRS).write_text(json.dumps(attrs | {"coordinates": " ".join(coordinates).strip()}))
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -263,7 +274,7 @@ def labels_of(samples: xr.Dataset) -> xr.Dataset:
         for name, values in samples.coords.items()
         if "sample" in values.dims and values.dtype.kind not in "biufc"
     ]
-    return samples[[]].reset_coords()[named].set_coords(named) if named else xr.Dataset()
+    return xr.Dataset(coords={name: samples[name].variable for name in named})
 
 
 def units_of(size: int, block: int) -> int:
@@ -304,8 +315,9 @@ def opened(
                 # Nothing came of it.
                 shutil.rmtree(folder, ignore_errors=True)
                 before.rename(folder)
-        for end in ("old", "replaced"):
-            shutil.rmtree(_beside(folder, end), ignore_errors=True)
+        if store.complete and store.folder == folder:
+            for end in ("old", "replaced"):
+                shutil.rmtree(_beside(folder, end), ignore_errors=True)
 
 
 def _begun(
@@ -395,6 +407,8 @@ def check_same(folder: Path, there: dict[str, Any], asked: dict[str, Any]) -> in
 def _whole(folder: Path) -> dict[int, Unit]:
     """Return the units of a store whose files are as they were written."""
     units = read_units(folder)
+    if (folder / ATTRS).is_file() and not _is_json(folder / ".zattrs"):
+        shutil.copyfile(folder / ATTRS, folder / ".zattrs")
     try:
         readable = not units or bool(open_arrays(folder).sizes)
     except Exception:
@@ -472,6 +486,20 @@ def clear(folder: Path) -> None:
 
 def _chunks(folder: Path, names: tuple[str, ...]) -> list[str]:
     return [f"{name}/{file.name}" for name in names for file in sorted((folder / name).glob("[0-9]*"))]
+
+
+def _is_json(file: Path) -> bool:
+    try:
+        json.loads(file.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return False
+    return True
+
+
+def _group(folder: Path) -> Any:
+    import zarr
+
+    return zarr.open_group(folder, mode="r+", zarr_format=2, use_consolidated=False)
 
 
 def _beside(folder: Path, end: str) -> Path:
