@@ -76,7 +76,9 @@ def ppf(distribution: Any, u: Array) -> Array:
         cumulative[-1] = 1.0
         found: Array = levels[np.searchsorted(cumulative, u, side="left").clip(0, len(levels) - 1)]
         return found
-    flat = np.asarray(distribution.inv(np.ravel(u)), dtype=np.float64)
+    with np.errstate(all="ignore"):
+        # Its searches step outside the numbers on the way.
+        flat = np.asarray(distribution.inv(np.ravel(u)), dtype=np.float64)
     return flat.reshape(np.shape(u))
 
 

@@ -53,7 +53,6 @@ WORDS = sorted(
         *("random", "sobol", "relative", "shift", "each", "spring", "weights", "components", "film", "value"),
         *("model", "inputs", "analysis", "options", "over", "compare", "contenders", "problem", "reference"),
     }
-    - {"degree"}
 )
 
 

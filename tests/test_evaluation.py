@@ -170,7 +170,7 @@ def test_models_that_break_the_contract_are_named(monkeypatch):
     for message, model in cases:
         with pytest.raises(SchemaError, match=message):
             hipuq.evaluate(model, square_samples(), n_jobs=1)
-    with pytest.raises(ModelError, match="6 of 10 samples failed.* different dims in different blocks"):
+    with pytest.raises(ModelError, match=r"6 of 10 samples failed.* different dims in different blocks"):
         hipuq.evaluate(uneven, square_samples(), n_jobs=1)
 
 

@@ -98,7 +98,7 @@ def study_file(r) -> bytes:
             table["inputs"]["friction"] = {"distribution": family, **own}
         elif kind < 0.5 and isinstance(analyses, list) and analyses and isinstance(analyses[0], dict):
             method = r.choice(sorted(METHODS))
-            names = sorted({name for stage in STAGES for name in METHODS[method].options(stage)} - {"degree"})
+            names = sorted({name for stage in STAGES for name in METHODS[method].options(stage)})
             analyses[0] |= {"method": method, "options": {r.choice(names): evil(r) for _ in range(2)}}
         elif table:
             mutate(table, r)

@@ -12,6 +12,17 @@ from hipuq import _chaospy
 from hipuq.distributions.base import PROBES, Array, Distribution, check_quantiles
 from hipuq.errors import InputError
 
+_RAISED = (
+    AssertionError,
+    AttributeError,
+    ArithmeticError,
+    LookupError,
+    RecursionError,
+    TypeError,
+    ValueError,
+)
+"""What distributions of others were seen to raise about their arguments."""
+
 
 def as_distribution(value: object, name: str = "distribution") -> Distribution:
     """Return `value` as a `Distribution`.
@@ -47,7 +58,7 @@ def as_distribution(value: object, name: str = "distribution") -> Distribution:
         check_quantiles(found, name)
     except InputError:
         raise
-    except (AssertionError, AttributeError, TypeError, ValueError) as error:
+    except _RAISED as error:
         # chaospy checks its arguments by assert, some of them on first use only; scipy's quantiles
         # of several variables do not broadcast.
         raise InputError(f"{name} is {value!r}, which cannot be used: {error}") from error
@@ -77,6 +88,12 @@ def _from_chaospy(value: Any, name: str) -> Distribution:
             raise InputError("the description is not exact")
     except (InputError, SyntaxError, ValueError):
         description = {"kind": "opaque", "text": repr(value)}
+    if _is_skewed_pert(description):
+        raise InputError(
+            f"{name} is {value!r}: chaospy's PERT takes the mean for the mode; take the family 'pert' of a "
+            "study, or chaospy's Beta with the shapes 1 + 4 (mode - lower) / (upper - lower) and "
+            "1 + 4 (upper - mode) / (upper - lower)"
+        )
     return Distribution(
         value,
         partial(_chaospy.ppf, value),
@@ -84,6 +101,21 @@ def _from_chaospy(value: Any, name: str) -> Distribution:
         _chaospy.support(value),
         description,
     )
+
+
+def _is_skewed_pert(description: Any) -> bool:
+    """Say whether a description holds a PERT of chaospy whose mode is not in the middle."""
+    if isinstance(description, list):
+        return any(map(_is_skewed_pert, description))
+    if not isinstance(description, Mapping):
+        return False
+    if description.get("name") == "PERT":
+        given = dict(zip(("lower", "mode", "upper"), description["args"], strict=False))
+        given |= description["kwargs"]
+        if all(isinstance(given.get(key), int | float) for key in ("lower", "mode", "upper")):
+            return not np.isclose(2 * given["mode"], given["lower"] + given["upper"], rtol=1e-12, atol=0)
+        return True
+    return any(map(_is_skewed_pert, description.values()))
 
 
 def _from_ppf(value: Any) -> Distribution:
@@ -117,7 +149,7 @@ def _rebuilds(description: Mapping[str, Any], value: Any) -> bool:
     try:
         again = scipy_frozen(description)
         return bool(np.array_equal(again.ppf(PROBES), value.ppf(PROBES)))
-    except (InputError, TypeError, ValueError):
+    except _RAISED:
         return False
 
 
@@ -142,5 +174,5 @@ def scipy_frozen(description: Mapping[str, Any]) -> Any:
         raise InputError(f"scipy.stats has no distribution {name!r}")
     try:
         return family(*description.get("args", ()), **description.get("kwargs", {}))
-    except (TypeError, ValueError) as error:
+    except _RAISED as error:
         raise InputError(f"scipy.stats.{name} does not take these arguments: {error}") from error

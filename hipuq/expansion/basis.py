@@ -157,6 +157,8 @@ def _caps(
         raise InputError(f"q is {q!r}: the norm of the truncation lies above 0 and is at most 1")
     if degree < 0:
         raise InputError(f"degree is {degree!r}: it must be 0 or more")
+    if degree > MOST_TERMS:
+        raise InputError(f"degree is {degree!r}: it must be at most {MOST_TERMS:,}")
     if interaction is not None and interaction < 1:
         raise InputError(f"interaction is {interaction!r}: it must be 1 or more, or None for no limit")
     caps = np.full(dimension, degree) if largest is None else np.minimum(np.asarray(largest), degree)

@@ -17,6 +17,7 @@ import xarray as xr
 from hipuq.differences import difference
 from hipuq.errors import StoreError
 from hipuq.store.arrays import open_arrays, quiet
+from hipuq.store.guarding import check_store
 from hipuq.store.ledger import ABOUT, Unit, add_unit, as_they_were, files_of, read_about, read_units
 from hipuq.store.lock import locked
 from hipuq.store.reporting import reported
@@ -27,6 +28,9 @@ UNITS, BLOCKS = 64, 64
 
 ATTRS = "hipuq.attrs.json"
 """Attributes as xarray wrote them at first: the last ones replace them, and could be cut off."""
+
+METADATA = ".zmetadata"
+"""What readers look at first: all metadata together."""
 
 END = -1
 """Number of the unit that holds what is written at the end."""
@@ -407,10 +411,16 @@ def check_same(folder: Path, there: dict[str, Any], asked: dict[str, Any]) -> in
 def _whole(folder: Path) -> dict[int, Unit]:
     """Return the units of a store whose files are as they were written."""
     units = read_units(folder)
+    # Both are written last: what is left of them says nothing of the units.
     if (folder / ATTRS).is_file() and not _is_json(folder / ".zattrs"):
         shutil.copyfile(folder / ATTRS, folder / ".zattrs")
+    if (folder / METADATA).is_file() and not _is_json(folder / METADATA):
+        (folder / METADATA).unlink()
     try:
-        readable = not units or bool(open_arrays(folder).sizes)
+        if units:
+            check_store(folder)
+            open_arrays(folder)
+        readable = True
     except Exception:
         # Whatever the libraries say of broken metadata: what is there cannot be read.
         readable = False

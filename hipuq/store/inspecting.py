@@ -49,7 +49,7 @@ def check_inside(file: Path) -> None:
     OSError, ValueError, KeyError, RuntimeError
         As h5py raises them for files that are broken.
     """
-    import h5py  # type: ignore[import-untyped]
+    import h5py
 
     check_plain_file(file, MAXIMUM_BYTES)
     with h5py.File(file, "r") as opened:

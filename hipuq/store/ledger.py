@@ -10,7 +10,7 @@ import json
 import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from hipuq.errors import StoreError
@@ -76,7 +76,7 @@ class Unit:
         """
         try:
             found = json.loads(line)
-            files = {str(name): (int(size), int(crc)) for name, (size, crc) in found["files"].items()}
+            files = {_inside(name): (int(size), int(crc)) for name, (size, crc) in found["files"].items()}
             failures = {int(row): str(message) for row, message in found["failed"]}
             counts = int(found["lost"]), int(found["undecided"])
             return cls(int(found["unit"]), files, failures, *counts, float(found["seconds"]))
@@ -149,11 +149,28 @@ def as_they_were(folder: Path, files: Mapping[str, tuple[int, int]], *, whole: b
         Whether to read them; else sizes alone are compared.
     """
     try:
-        if whole:
-            return files_of(folder, files) == dict(files)
-        return all((folder / name).stat().st_size == size for name, (size, _) in files.items())
+        # A pipe has a size too, and never ends.
+        sizes = all(
+            (folder / name).is_file() and (folder / name).stat().st_size == size
+            for name, (size, _) in files.items()
+        )
+        return sizes and (not whole or files_of(folder, files) == dict(files))
     except OSError:
         return False
+
+
+def _inside(name: str) -> str:
+    """Return the name of a file in a store.
+
+    Raises
+    ------
+    ValueError
+        If it is none, but leads out of it.
+    """
+    path = PurePosixPath(name)
+    if path.is_absolute() or ".." in path.parts:
+        raise ValueError(f"{name} is outside the store")
+    return name
 
 
 def _text(file: Path) -> str:

@@ -10,6 +10,7 @@ import xarray as xr
 
 from hipuq.errors import StoreError
 from hipuq.store.blocks import complete, is_store
+from hipuq.store.guarding import check_store
 from hipuq.store.ledger import ABOUT
 from hipuq.store.reporting import reported
 
@@ -71,9 +72,8 @@ def load_outcomes(path: str | os.PathLike[str]) -> xr.Dataset:
             missing = complete(folder)
         if missing:
             raise StoreError(f"cannot read {folder}: {missing}; evaluate again with resume=True")
-    elif not is_store(folder):
-        raise StoreError(f"there are no outcomes at {folder}: it is not a Zarr store")
     with reported("read", folder):
+        check_store(folder)
         outcomes = xr.open_zarr(folder, chunks=None, consolidated=True)
     if "hipuq_version" not in outcomes.attrs:
         raise StoreError(f"{folder} is not a store of hipuq: it has no attribute hipuq_version")
