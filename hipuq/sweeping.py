@@ -14,10 +14,11 @@ from hipuq import schema
 from hipuq.combinations import Values, gathered, points
 from hipuq.combinations import at as at
 from hipuq.combinations import swept as swept
-from hipuq.driver import check_arguments, completed, estimated
+from hipuq.driver import check_arguments
 from hipuq.errors import InputError, check_name
 from hipuq.evaluation import How
 from hipuq.inputs import Inputs
+from hipuq.rounds import completed, estimated
 from hipuq.sampling import Seed, seed_of
 
 ESTIMATES = (

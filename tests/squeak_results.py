@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 
 import hipuq
-from hipuq.driver import completed
 from hipuq.methods import METHODS
 from hipuq.occurring import frequency_ranges, verdict_counts
+from hipuq.rounds import completed
 from hipuq.sweeping import gathered
 
 PRESET = "oberst2016-calibrated"

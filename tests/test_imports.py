@@ -46,6 +46,7 @@ ORDER = [
     ["saltelli"],
     ["surrogates"],
     ["methods"],
+    ["rounds"],
     ["driver"],
     ["sweeping"],
     ["comparison"],

@@ -404,9 +404,10 @@ def test_a_full_disk_loses_nothing(whole, tmp_path):
 
 
 def test_units_are_a_64th_of_all_at_most():
-    assert blocks.units_of(10, 1024) == 1024
+    assert blocks.units_of(10, 1024) == blocks.units_of(10, 4096) == 1024
     assert blocks.units_of(100_000, 1) == 64
-    assert blocks.units_of(10_000_000, 1024) == 65_536
+    assert blocks.units_of(10_000_000, 1024) == blocks.units_of(10_000_000, 4096) == 65_536
+    assert blocks.units_of(10_000_000, 16) == 1024
     assert blocks.units_of(1_000_000, 1024) == 16_384
 
 

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from hipuq.driver import completed, estimated, method_named
+from hipuq.driver import method_named
 from hipuq.errors import InputError, UnknownNameError, check_name
 from hipuq.evaluation import How
 from hipuq.inputs import Inputs
 from hipuq.methods import Method
+from hipuq.rounds import completed, estimated
 from hipuq.sampling import check_count
 
 Model = Callable[..., xr.Dataset]

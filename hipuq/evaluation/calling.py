@@ -166,6 +166,8 @@ class _Asked:
                 raise SchemaError(
                     f"status of the model has the dims {outputs['status'].dims}: it needs ('sample',)"
                 )
+            if not self.failures and outputs["status"].dtype == np.int8:
+                return outputs
             status = outputs["status"].values.astype(np.int8)
         else:
             status = np.full(self.size, schema.STATUS["ok"], np.int8)
@@ -192,8 +194,8 @@ def _is_verdict(name: str) -> bool:
 def _checked(call: Call, samples: xr.Dataset) -> xr.Dataset:
     """Return the model's outputs, checked, without coords over sample."""
     keep, size = call.keep, samples.sizes["sample"]
-    whole = keep is None or not hasattr(call.model, "outcomes")
-    given = call.model(samples) if whole else call.model(samples, keep)
+    everything = keep is None or not hasattr(call.model, "outcomes")
+    given = call.model(samples) if everything else call.model(samples, keep)
     if not isinstance(given, xr.Dataset):
         raise SchemaError(f"the model must return an xarray Dataset, not {type(given).__name__}")
     both = [str(name) for name in given.data_vars if name in samples.variables]
@@ -222,17 +224,23 @@ def _checked(call: Call, samples: xr.Dataset) -> xr.Dataset:
         always = [name for name in BOOKS if name in given and name not in keep]
         given = given[[*keep, *always]]
     made = outputs_of(given)
-    given = given.drop_vars([n for n in given.coords if "sample" in given[n].dims and n not in made])
-    given = given.assign({name: _floating(name, values) for name, values in outputs_of(given).items()})
+    own = [name for name, values in given.coords.items() if "sample" in values.dims and name not in made]
+    if own:
+        given = given.drop_vars(own)
+    whole_numbers = {name: _floating(values) for name, values in made.items() if _counts(name, values)}
+    if whole_numbers:
+        given = given.assign(whole_numbers)
     if call.layout is not None and (fault := call.layout.fault(given)):
         raise _FaultError(fault)
     return given
 
 
-def _floating(name: Hashable, values: xr.DataArray) -> xr.DataArray:
+def _counts(name: Hashable, values: xr.DataArray) -> bool:
+    return name not in BOOKS and values.dtype.kind in "biu"
+
+
+def _floating(values: xr.DataArray) -> xr.DataArray:
     """Return an output as floating point numbers, so that it can be missing where a sample fails."""
-    if name in BOOKS or values.dtype.kind in "fc":
-        return values
     if values.dtype.kind == "b":
         return values.astype(np.float32).assign_attrs({"role": schema.VERDICT, **values.attrs})
     return values.astype(np.float64)
@@ -253,7 +261,7 @@ def _in_order(given: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
     # Of several operands what they have in common is left.
     inherited = [{"units": ""}, *(values.attrs for values in samples.variables.values() if values.attrs)]
     bare = {n: v.drop_attrs() for n, v in given.data_vars.items() if v.attrs and v.attrs in inherited}
-    return given.assign(bare)
+    return given.assign(bare) if bare else given
 
 
 def _inputs(sample: xr.Dataset) -> str:

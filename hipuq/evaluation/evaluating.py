@@ -22,11 +22,13 @@ from hipuq.evaluation.stream import Limit, Stream, Unit, undecided_in
 from hipuq.evaluation.workers import check_travels, workers
 from hipuq.progress import progress_bar
 from hipuq.sampling import check_count
-from hipuq.store.blocks import BlockStore, failure_table, labels_of, opened, units_of
+from hipuq.store.blocks import BlockStore, labels_of, units_of
+from hipuq.store.failures import failure_table
+from hipuq.store.opening import opened
 from hipuq.store.outcomes import load_outcomes
 
 BLOCK = 1024
-"""Samples handed to the model at a time, unless it says in an attribute ``block`` how many it takes."""
+"""Samples handed to the model at a time, unless its attribute ``block`` says how many it takes at most."""
 
 MAX_FAILED = 0.5
 """Share of the samples that may fail."""
@@ -158,7 +160,8 @@ def evaluated(model: Model, samples: xr.Dataset | Design, keep: Iterable[str] | 
         )
     if how.executor == "processes":
         check_travels(model)
-    run = _Run(model, design, names, block, how)
+    # Few samples are divided further, so that every core has some.
+    run = _Run(model, design, names, min(block, units_of(design.size, block)), how)
     if how.store is None:
         return run.in_memory().assign_attrs(seconds=time.perf_counter() - started)
     return run.stored(Path(how.store))

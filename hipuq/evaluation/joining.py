@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from hipuq.errors import SchemaError
-from hipuq.store.blocks import FAILURES, failure_table
+from hipuq.store.failures import FAILURES, failure_table
 
 
 def together(first: xr.Dataset, more: xr.Dataset) -> xr.Dataset:

@@ -46,6 +46,8 @@ class CEAModel(ABC):
         When verdicts go beyond double precision: ``"auto"``, ``"always"``, ``"never"``.
     parameters : mapping
         Name -> `Parameter`, all known to the schema.
+    block : int
+        Samples that it takes at a time, at most: enough to forget the cost of a call.
     outcomes : tuple of str
         Names of the outcomes that a call can give.
     limits : tuple of str
@@ -53,6 +55,7 @@ class CEAModel(ABC):
     """
 
     name: ClassVar[str]
+    block: ClassVar[int] = 4096
     limits: ClassVar[tuple[str, ...]] = LINEAR
     outcomes: ClassVar[tuple[str, ...]] = (*schema.OUTCOMES, "status", "decided_by")
 
@@ -244,9 +247,11 @@ class CEAModel(ABC):
         given = given.transpose(*dims)
         for dim in dims[1:]:
             if dim in given.coords:
-                numbers = np.arange(1, given.sizes[dim] + 1)
-                if not np.array_equal(np.sort(given[dim].values), numbers):
-                    raise SchemaError(f"{dim} of {name} is labelled {given[dim].values}: it needs {numbers}")
+                labels, numbers = given[dim].values, np.arange(1, given.sizes[dim] + 1)
+                if np.array_equal(labels, numbers):
+                    continue
+                if not np.array_equal(np.sort(labels), numbers):
+                    raise SchemaError(f"{dim} of {name} is labelled {labels}: it needs {numbers}")
                 given = given.sortby(dim)
         values = np.ascontiguousarray(given.values, dtype=np.float64)
         parameter.check(name, values)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import shutil
 import time
@@ -14,29 +13,21 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from hipuq.differences import difference
 from hipuq.errors import StoreError
-from hipuq.store.arrays import open_arrays, quiet
-from hipuq.store.guarding import check_store
-from hipuq.store.ledger import ABOUT, Unit, add_unit, as_they_were, files_of, read_about, read_units
-from hipuq.store.lock import locked
+from hipuq.store.arrays import open_arrays, quiet, write_chunks
+from hipuq.store.failures import FAILURES, failure_table
+from hipuq.store.ledger import ABOUT, END, Files, Unit, add_unit, files_of
 from hipuq.store.reporting import reported
 from hipuq.store.reuse import Reuse
 
-UNITS, BLOCKS = 64, 64
-"""A store has about so many units, but none of more blocks of the model than this."""
+UNITS, STEPS, STEP = 64, 64, 1024
+"""A store has about so many units, each of so many steps at most, each of so many samples at most."""
 
 ATTRS = "hipuq.attrs.json"
 """Attributes as xarray wrote them at first: the last ones replace them, and could be cut off."""
 
 METADATA = ".zmetadata"
 """What readers look at first: all metadata together."""
-
-END = -1
-"""Number of the unit that holds what is written at the end."""
-
-FAILURES = ("failed_sample", "failure_message")
-"""Variables of the table of failures, over ``failure``."""
 
 
 class BlockStore:
@@ -176,23 +167,15 @@ class BlockStore:
         with self._writing():
             if not self._arrays:
                 self._open(outcomes)
-            rows, names = self.rows(number), []
+            files: Files = {}
             for name, array in self._arrays.items():
-                values, axis = outcomes[name], outcomes[name].dims.index("sample")
+                values, axis = outcomes[name].values, outcomes[name].dims.index("sample")
                 shape = (*values.shape[:axis], self.size, *values.shape[axis + 1 :])
-                longest = tuple(np.maximum(shape, array.shape).tolist())
-                if longest != array.shape:
+                if (longest := tuple(np.maximum(shape, array.shape).tolist())) != array.shape:
                     array.resize(longest)
-                place: list[slice] = [slice(0, n) for n in shape]
-                place[axis] = rows
-                array[tuple(place)] = values.values
-                grid = [range(-(-n // c)) for n, c in zip(shape, array.chunks, strict=True)]
-                grid[axis] = range(number, number + 1)
-                names += [f"{name}/{'.'.join(map(str, key))}" for key in itertools.product(*grid)]
+                files |= write_chunks(self.folder, name, array, values, axis, number)
             now = time.perf_counter()
-            unit = Unit(
-                number, files_of(self.folder, names), dict(failures), lost, undecided, now - self._began
-            )
+            unit = Unit(number, files, dict(failures), lost, undecided, now - self._began)
             add_unit(self.folder, unit)
             self.units[number], self._began = unit, now
 
@@ -225,8 +208,6 @@ class BlockStore:
 
     def _open(self, outcomes: xr.Dataset) -> None:
         """Open the arrays, or make them like a unit's outcomes."""
-        import zarr
-
         names = [
             str(name)
             for name, values in outcomes.variables.items()
@@ -236,9 +217,7 @@ class BlockStore:
             clear(self.folder)
             self._make(outcomes, names)
         group = _group(self.folder)
-        # Chunks that hold nothing but zeros or NaN are written too: what is not there is known to be missing.
-        with zarr.config.set({"array.write_empty_chunks": True}):
-            self._arrays = {name: group[name] for name in names}
+        self._arrays = {name: group[name] for name in names}
 
     def _make(self, outcomes: xr.Dataset, names: list[str]) -> None:
         encoding = {}
@@ -282,209 +261,19 @@ def labels_of(samples: xr.Dataset) -> xr.Dataset:
 
 
 def units_of(size: int, block: int) -> int:
-    """Return the samples of a unit: a 64th of all, whole blocks of the model, at most 64 of them."""
-    return min(max(-(-size // (UNITS * block)), 1), BLOCKS) * block
+    """Return the samples of a unit: about a 64th of all.
 
-
-@contextmanager
-def opened(
-    folder: Path, definition: Mapping[str, Any], block: int, *, resume: bool, replace: bool = False
-) -> Iterator[BlockStore]:
-    """Open a store for writing; no other run can, until it is closed.
+    At least a step, which is what the model takes, or 1024 if it takes more; at most 64 steps.
 
     Parameters
     ----------
-    folder : Path
-    definition : mapping
-        What the outcomes follow from, JSON-able; ``"samples"`` is their number.
+    size : int
+        Number of all.
     block : int
-        Samples that the model takes at a time.
-    resume : bool
-        Whether to go on with what is there.
-    replace : bool
-        Whether a store that is there gives way once the first unit of the new one is complete.
-
-    Raises
-    ------
-    StoreError
-        If there is something else, a store of other outcomes, or another run writes to it.
+        Samples that the model takes at a time, at most.
     """
-    with locked(folder):
-        with reported("write", folder):
-            store, before = _begun(folder, json.loads(json.dumps(definition)), block, resume, replace)
-        try:
-            yield store
-        finally:
-            if before is not None and not store.units:
-                # Nothing came of it.
-                shutil.rmtree(folder, ignore_errors=True)
-                before.rename(folder)
-        if store.complete and store.folder == folder:
-            for end in ("old", "replaced"):
-                shutil.rmtree(_beside(folder, end), ignore_errors=True)
-
-
-def _begun(
-    folder: Path, asked: dict[str, Any], block: int, resume: bool, replace: bool
-) -> tuple[BlockStore, Path | None]:
-    """Return the store to write to, and where the one is now that was there before it."""
-    there = folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
-    if there and not (folder / ABOUT).is_file() and not (replace and is_store(folder)):
-        raise StoreError(f"cannot write {folder}: something that is not a store of hipuq is there")
-    if there and not resume and not replace:
-        raise StoreError(
-            f"there is a store at {folder} already: go on with resume=True, or take another path"
-        )
-    aside = _beside(folder, "old" if resume else "replaced")
-    if resume and (kept := _kept(folder, aside, asked)) is not None:
-        return kept, None
-    if there:
-        if aside.exists():
-            shutil.rmtree(aside)
-        folder.rename(aside)
-    reuse = _reuse(aside, asked) if resume else None
-    folder.mkdir(parents=True, exist_ok=True)
-    size = size_of(asked)
-    chunk = units_of(size, block)
-    (folder / ABOUT).write_text(json.dumps({"definition": asked, "chunk": chunk}, indent=1))
-    return BlockStore(folder, size, chunk, {}, reuse), aside if there else None
-
-
-def _kept(folder: Path, aside: Path, asked: dict[str, Any]) -> BlockStore | None:
-    """Return the store that is there, if it has what is asked for or can get it; None if it has less."""
-    if not (folder / ABOUT).is_file():
-        return None
-    about = read_about(folder)
-    if check_same(folder, about["definition"], asked) < size_of(asked):
-        if aside.exists() and complete(folder) is not None:
-            raise StoreError(
-                f"the store at {folder} is being extended, to {size_of(about['definition']):,} samples: go "
-                "on with that first"
-            )
-        return None
-    if size_of(about["definition"]) > size_of(asked) and complete(folder) is not None:
-        # A further round was begun: what is asked for lies aside.
-        folder, about = aside, read_about(aside)
-        check_same(folder, about["definition"], asked)
-    size, units = size_of(about["definition"]), _whole(folder)
-    count = -(-size // about["chunk"])
-    incomplete = any(number not in units for number in range(count))
-    reuse = _reuse(aside, asked) if incomplete and aside != folder else None
-    return BlockStore(folder, size, about["chunk"], units, reuse)
-
-
-def size_of(definition: Mapping[str, Any]) -> int:
-    """Return the number of samples of a definition, those of all rounds."""
-    return int(definition["samples"]) + sum(map(int, definition.get("rounds", [])))
-
-
-def check_same(folder: Path, there: dict[str, Any], asked: dict[str, Any]) -> int:
-    """Return the number of samples of a store, once it is known that they are of those asked for.
-
-    More samples of the same design may be asked for, and more rounds or fewer.
-
-    Raises
-    ------
-    StoreError
-        If they are not; it says what differs.
-    """
-    here, asked = json.loads(json.dumps(there)), dict(asked)
-    rounds = [one.pop("rounds", []) for one in (here, asked)]
-    if here["samples"] < asked["samples"]:
-        here["samples"] = asked["samples"]
-        if isinstance(here.get("design"), dict) and "n" in asked.get("design", {}):
-            here["design"]["n"] = asked["design"]["n"]
-    elif all(a == b for a, b in zip(*rounds, strict=False)):
-        rounds = []
-    found = difference(here, asked) or (
-        difference({"rounds": rounds[0]}, {"rounds": rounds[1]}) if rounds else None
-    )
-    if found is not None:
-        place, old, new = found
-        raise StoreError(
-            f"the store at {folder} was made with {place} {old}, not {new}: take another path, or what it "
-            "was made with"
-        )
-    return size_of(there)
-
-
-def _whole(folder: Path) -> dict[int, Unit]:
-    """Return the units of a store whose files are as they were written."""
-    units = read_units(folder)
-    # Both are written last: what is left of them says nothing of the units.
-    if (folder / ATTRS).is_file() and not _is_json(folder / ".zattrs"):
-        shutil.copyfile(folder / ATTRS, folder / ".zattrs")
-    if (folder / METADATA).is_file() and not _is_json(folder / METADATA):
-        (folder / METADATA).unlink()
-    try:
-        if units:
-            check_store(folder)
-            open_arrays(folder)
-        readable = True
-    except Exception:
-        # Whatever the libraries say of broken metadata: what is there cannot be read.
-        readable = False
-    return {
-        number: unit
-        for number, unit in units.items()
-        if readable and as_they_were(folder, unit.files, whole=True)
-    }
-
-
-def _reuse(folder: Path, asked: dict[str, Any]) -> Reuse | None:
-    """Return what can be taken from a store of fewer samples."""
-    if not (folder / ABOUT).is_file():
-        return None
-    about = read_about(folder)
-    check_same(folder, about["definition"], asked)
-    units = {number: unit for number, unit in _whole(folder).items() if number != END}
-    return Reuse(folder, about["chunk"], units) if units else None
-
-
-def complete(folder: Path) -> str | None:
-    """Say what is missing in a store that was written unit by unit; None if nothing is."""
-    units = read_units(folder)
-    done, size = progress_of(folder)
-    if done < size or END not in units:
-        return f"it is not complete, {done:,} of {size:,} samples are there"
-    for number, unit in units.items():
-        if not as_they_were(folder, unit.files, whole=number == END):
-            return "files in it are missing or damaged"
-    return None
-
-
-def progress_of(folder: Path) -> tuple[int, int]:
-    """Return the number of samples that a store has, by its ledger, and that of all that it is to have."""
-    about = read_about(folder)
-    size, chunk = size_of(about["definition"]), about["chunk"]
-    numbers = [number for number in read_units(folder) if 0 <= number < -(-size // chunk)]
-    return sum(min(chunk, size - number * chunk) for number in numbers), size
-
-
-def failure_table(failures: Mapping[int, str]) -> xr.Dataset:
-    """Return the messages of failed samples.
-
-    Parameters
-    ----------
-    failures : mapping
-        Row -> message.
-
-    Returns
-    -------
-    Dataset
-        ``failure_message(failure)`` with the coord ``failed_sample``.
-    """
-    number, text = FAILURES
-    rows = np.array(list(failures), np.int64)
-    messages = np.array(list(failures.values()), dtype=object).astype(str)
-    attrs = {"long_name": "message of a failed sample", "units": "1"}
-    place = {"long_name": "place of a failed sample among all, from 0", "units": "1"}
-    return xr.Dataset({text: ("failure", messages, attrs)}, {number: ("failure", rows, place)})
-
-
-def is_store(folder: Path) -> bool:
-    """Say whether a folder is a Zarr store."""
-    return (folder / ".zgroup").is_file() or (folder / "zarr.json").is_file()
+    step = min(block, STEP)
+    return min(max(-(-size // (UNITS * step)), 1), STEPS) * step
 
 
 def clear(folder: Path) -> None:
@@ -498,19 +287,7 @@ def _chunks(folder: Path, names: tuple[str, ...]) -> list[str]:
     return [f"{name}/{file.name}" for name in names for file in sorted((folder / name).glob("[0-9]*"))]
 
 
-def _is_json(file: Path) -> bool:
-    try:
-        json.loads(file.read_bytes())
-    except (OSError, ValueError, RecursionError):
-        return False
-    return True
-
-
 def _group(folder: Path) -> Any:
     import zarr
 
     return zarr.open_group(folder, mode="r+", zarr_format=2, use_consolidated=False)
-
-
-def _beside(folder: Path, end: str) -> Path:
-    return folder.with_name(f".{folder.name}.hipuq-{end}")

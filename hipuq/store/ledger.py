@@ -18,6 +18,9 @@ from hipuq.errors import StoreError
 ABOUT, LINES = "hipuq.json", "hipuq.jsonl"
 """Files of a store: what it is of, and its ledger."""
 
+END = -1
+"""Number of the unit that stands for what is written at the end."""
+
 LARGEST = 2**28
 """Bytes of these files that are read, at most."""
 

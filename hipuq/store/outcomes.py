@@ -9,7 +9,7 @@ from pathlib import Path
 import xarray as xr
 
 from hipuq.errors import StoreError
-from hipuq.store.blocks import complete, is_store
+from hipuq.store.completeness import is_store, missing_in
 from hipuq.store.guarding import check_store
 from hipuq.store.ledger import ABOUT
 from hipuq.store.reporting import reported
@@ -69,7 +69,7 @@ def load_outcomes(path: str | os.PathLike[str]) -> xr.Dataset:
     folder = Path(path)
     if (folder / ABOUT).is_file():
         with reported("read", folder):
-            missing = complete(folder)
+            missing = missing_in(folder)
         if missing:
             raise StoreError(f"cannot read {folder}: {missing}; evaluate again with resume=True")
     with reported("read", folder):

@@ -11,7 +11,7 @@ import xarray as xr
 
 from hipuq import schema
 from hipuq.combinations import at, gathered, points
-from hipuq.driver import DEFAULT, completed, estimated, method_named
+from hipuq.driver import method_named
 from hipuq.estimation.reduction import flag_counts
 from hipuq.evaluation import How, evaluate
 from hipuq.fragility_curve import fragility
@@ -19,6 +19,7 @@ from hipuq.friction import FRICTION, OF_ANY_MODE, FrictionIntegrated
 from hipuq.friction_limits import friction_limit
 from hipuq.models import CEAModel
 from hipuq.occurring import frequency_ranges, verdict_counts
+from hipuq.rounds import DEFAULT, completed, estimated
 from hipuq.store import load_outcomes
 from hipuq.study.headline import DAMPING
 from hipuq.study.plan import Analysis

@@ -13,12 +13,12 @@ import xarray as xr
 from hipuq.comparison import QUANTITIES, Reference, reference_from
 from hipuq.differences import difference
 from hipuq.driver import run as run_method
-from hipuq.driver import with_bounds
 from hipuq.errors import InputError, StudyError, check_name
 from hipuq.evaluation import evaluate
 from hipuq.friction import FRICTION, INTEGRATED_OUTCOME, FrictionIntegrated
 from hipuq.inputs import Inputs
 from hipuq.models import CEAModel
+from hipuq.rounds import with_bounds
 from hipuq.store import load_results
 from hipuq.study.building import without_friction
 from hipuq.study.compare_tables import ExactTable, ProblemTable, ResultsTable

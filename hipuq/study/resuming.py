@@ -17,7 +17,7 @@ from hipuq.errors import StoreError
 from hipuq.evidence import LITERATURE
 from hipuq.sampling import seed_of
 from hipuq.store import RESULTS_NAME, load_results
-from hipuq.store.blocks import progress_of
+from hipuq.store.completeness import progress_of
 from hipuq.store.ledger import ABOUT
 from hipuq.study.analysing import Groups, outcomes_of
 from hipuq.study.file import COMPARE
