@@ -209,7 +209,8 @@ def _executor(processes: bool, dask: str | None) -> Iterator[object]:
     except ImportError as error:
         raise InputError("--dask needs dask.distributed: install hipuq[dask]") from error
     try:
-        client: Any = Client(dask, timeout=CONNECT)  # type: ignore[no-untyped-call]
+        # Not the default one: xarray would take its locks for writing files.
+        client: Any = Client(dask, timeout=CONNECT, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, TimeoutError, ValueError, TypeError) as error:
         raise StoreError(f"there is no dask scheduler at {dask!r}: {error}") from error
     with client:
