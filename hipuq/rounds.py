@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +15,7 @@ from hipuq.evaluation import How, evaluated, together
 from hipuq.inputs import Inputs
 from hipuq.methods import Method
 from hipuq.sampling import spawn
+from hipuq.threads import one_thread
 
 DEFAULT: How = How()
 """Evaluation in memory, with threads."""
@@ -134,14 +134,6 @@ def estimated(record: Method, outcomes: xr.Dataset, inputs: Inputs, **options: A
     """
     with one_thread():
         return record.estimate(outcomes, inputs, **options)
-
-
-def one_thread() -> AbstractContextManager[Any]:
-    """Return a context in which BLAS takes one thread: its matrices are small here, more would wait."""
-    from threadpoolctl import threadpool_limits
-
-    limits: AbstractContextManager[Any] = threadpool_limits(1, "blas")
-    return limits
 
 
 def with_bounds(of: Iterable[str], model: Callable[..., xr.Dataset]) -> list[str]:

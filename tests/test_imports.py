@@ -21,6 +21,7 @@ HEAVY = ("xarray", "pandas", "scipy", "chaospy", "SALib", "matplotlib", "dask", 
 ORDER = [
     ["errors"],
     ["differences"],
+    ["threads"],
     ["_chaospy", "_salib"],
     ["schema"],
     ["distributions"],

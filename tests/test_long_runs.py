@@ -14,6 +14,7 @@ from hipuq.cli import main
 from hipuq.errors import ModelError, StoreError
 from hipuq.models import CEAModel
 from hipuq.store.lock import locked
+from hipuq.study.running import RUN
 
 STUDY = """
 title = "Long"
@@ -161,7 +162,10 @@ def test_processes_give_the_same_bits(whole, tmp_path):
 
 def test_one_run_in_a_folder_at_a_time(whole, tmp_path):
     (tmp_path / "study").mkdir()
-    with locked(tmp_path / "study" / "out"), pytest.raises(StoreError, match="another run is writing to"):
+    with (
+        locked(tmp_path / "study" / "out" / RUN),
+        pytest.raises(StoreError, match="another run is writing to"),
+    ):
         run(tmp_path / "study")
     with pytest.raises(ModelError, match="the executor failed, RuntimeError: no more"):
         run(tmp_path / "study", executor=Broken())

@@ -15,6 +15,7 @@ import xarray as xr
 from hipuq import schema
 from hipuq.errors import HipuqError, InputError, ModelError, SchemaError, UnknownNameError, unknown_name
 from hipuq.evaluation.layout import Layout, outputs_of
+from hipuq.threads import one_thread
 
 Model = Callable[..., xr.Dataset]
 
@@ -99,7 +100,8 @@ def ask(call: Call, samples: xr.Dataset, first: int) -> Answer:
     ModelError
         If a sample fails and ``on_error`` is ``"raise"``; it tells the sample's inputs.
     """
-    with _one_thread(call.home):
+    # Threads of the process that asks are seen to there.
+    with one_thread() if call.home not in (None, here()) else nullcontext():
         return _Asked(call, samples, first).answer()
 
 
@@ -279,12 +281,3 @@ def _shortened(text: str) -> str:
 def here() -> tuple[str, int]:
     """Return machine and process."""
     return platform.node(), os.getpid()
-
-
-def _one_thread(home: tuple[str, int] | None) -> Any:
-    """Return a context with one thread of BLAS, where the process that asks has not seen to it."""
-    if home is None or home == here():
-        return nullcontext()
-    from threadpoolctl import threadpool_limits
-
-    return threadpool_limits(1, "blas")

@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 
 from hipuq.errors import HipuqError, InputError, ModelError
 from hipuq.sampling import check_count
+from hipuq.threads import one_thread
 
 EXECUTORS = ("threads", "processes")
 """Executors by name."""
@@ -129,7 +130,7 @@ def workers(executor: Any, n_jobs: int | None) -> Iterator[Workers]:
     jobs = (os.cpu_count() or 1) if n_jobs is None else check_count("n_jobs", n_jobs)
     if executor is None or executor in EXECUTORS:
         pool: Executor = _processes(jobs) if executor == "processes" else ThreadPoolExecutor(jobs)
-        with _own(pool), _one_thread():
+        with _own(pool), one_thread():
             yield Workers(pool, lambda: jobs)
         return
     given = getattr(executor, "_max_workers", None)
@@ -145,7 +146,7 @@ def workers(executor: Any, n_jobs: int | None) -> Iterator[Workers]:
             f"executor is {executor!r}: it must be 'threads', 'processes', a concurrent.futures.Executor "
             "or a client of dask.distributed"
         )
-    with _one_thread():
+    with one_thread():
         yield Workers(executor, count)
 
 
@@ -160,12 +161,6 @@ def _cores(client: Any) -> Callable[[], int]:
         return found
 
     return count
-
-
-def _one_thread() -> Any:
-    from threadpoolctl import threadpool_limits
-
-    return threadpool_limits(1, "blas")
 
 
 @contextmanager

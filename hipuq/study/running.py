@@ -74,7 +74,8 @@ def run_study(
     if resume:
         how = replace(how, store=folder, resume=True)
     _check_writable(folder)
-    with locked(folder):
+    # The lock lies inside: the folder above need not be ours to write to.
+    with locked(folder / RUN):
         return _run(study, folder, how, say)
 
 
@@ -120,6 +121,10 @@ def _run(study: Study, folder: Path, how: How, say: Callable[[str], None]) -> xr
     return results.tree()
 
 
+RUN = "run"
+"""What of an output folder one run at a time has."""
+
+
 @dataclass
 class _Results:
     """Results in memory and in the file; what is old gives way to the first ones, and not before."""
@@ -131,6 +136,7 @@ class _Results:
     begun: bool = False
 
     def add(self, found: Groups) -> None:
+        found = {key: own for key, own in found.items() if not self._has(key, own)}
         replaced = not self.groups.keys().isdisjoint(found)
         self.groups |= found
         if not self.begun or replaced:
@@ -139,6 +145,11 @@ class _Results:
             self.give_way()
         elif found:
             add_results(found, self.folder / RESULTS_NAME)
+
+    def _has(self, key: str, own: xr.Dataset) -> bool:
+        """Say whether a group is there already and in the file, but for the time at which it was made."""
+        there = self.groups.get(key)
+        return self.begun and there is not None and there.equals(own) and _attrs(there) == _attrs(own)
 
     def give_way(self) -> None:
         """Remove runs of comparisons and outcomes that belong to older results."""
@@ -165,6 +176,14 @@ class _Results:
     def _save(self) -> None:
         self.groups = {key: self.groups[key] for key in self._order()}
         save_results(xr.DataTree.from_dict(self.groups), self.folder / RESULTS_NAME)
+
+
+def _attrs(group: xr.Dataset) -> dict[str, str]:
+    """Return the attributes of a group and its variables as text, without the history."""
+    own = {
+        f"{name}/{key}": str(value) for name, v in group.variables.items() for key, value in v.attrs.items()
+    }
+    return own | {str(key): str(value) for key, value in group.attrs.items() if key != "history"}
 
 
 def _root(study: Study) -> Groups:
