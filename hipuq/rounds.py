@@ -15,6 +15,7 @@ from hipuq.evaluation import How, evaluated, together
 from hipuq.inputs import Inputs
 from hipuq.methods import Method
 from hipuq.sampling import spawn
+from hipuq.store.failures import part_of
 from hipuq.threads import one_thread
 
 DEFAULT: How = How()
@@ -113,7 +114,7 @@ def _parts(whole: xr.Dataset, places: Sequence[Places]) -> list[xr.Dataset]:
     if len(places) == 1:
         return [whole]
     size, seconds = whole.sizes["sample"], float(whole.attrs.get("seconds", np.nan))
-    parts = [whole.isel(sample=rows) for rows in places]
+    parts = [part_of(whole, rows) for rows in places]
     return [part.assign_attrs(seconds=seconds * part.sizes["sample"] / size) for part in parts]
 
 

@@ -2,15 +2,57 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
+# Reentrant: the garbage collector may end a generator that holds a context while this thread has the lock.
+_lock = threading.RLock()
+_open = 0
+_limit: Any = None
 
-def one_thread() -> AbstractContextManager[Any]:
-    """Return a context in which BLAS takes one thread, in the whole process."""
-    limits: AbstractContextManager[Any] = _controller().limit(limits=1, user_api="blas")
-    return limits
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Give a context in which BLAS takes one thread, in the whole process.
+
+    Contexts may overlap in any order and in several threads: the first one that is entered limits, and the
+    last one that is left brings back the number that was there before.
+    """
+    _enter()
+    try:
+        yield
+    finally:
+        _leave()
+
+
+def _enter() -> None:
+    global _open, _limit
+    with _lock:
+        if not _open:
+            _take_over()
+            _limit = _controller().limit(limits=1, user_api="blas")
+        _open += 1
+
+
+def _leave() -> None:
+    global _open, _limit
+    with _lock:
+        _open -= 1
+        if not _open:
+            _take_over()
+            _limit.restore_original_limits()
+            _take_over()
+            _limit = None
+
+
+def _take_over() -> None:
+    """Let any thread set the number: threadpoolctl may ignore all but the one that did so first."""
+    for library in _controller().lib_controllers:
+        if (clear := getattr(library, "clear_controlling_thread", None)) is not None:
+            clear(force=True)
 
 
 @cache

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,9 @@ import xarray as xr
 
 from hipuq import schema
 from hipuq.errors import HipuqError, InputError, ModelError, SchemaError, UnknownNameError, unknown_name
-from hipuq.evaluation.layout import Layout, outputs_of
+from hipuq.evaluation.layout import Layout
+from hipuq.store.arrays import outputs_of
+from hipuq.store.reporting import one_line
 from hipuq.threads import one_thread
 
 Model = Callable[..., xr.Dataset]
@@ -71,23 +73,26 @@ class Answer:
         How many of them gave nothing; the others gave NaN.
     kind : type
         Error that says it best if nothing else succeeds.
+    unfit : HipuqError or None
+        Why model and samples do not go together at all, if nothing has shown yet that they do.
     """
 
     outputs: xr.Dataset | None
     failures: dict[int, str] = field(default_factory=dict)
     lost: int = 0
     kind: type[HipuqError] = ModelError
+    unfit: HipuqError | None = None
 
 
-def ask(call: Call, samples: xr.Dataset, first: int) -> Answer:
+def ask(call: Call, samples: xr.Dataset, rows: Sequence[int]) -> Answer:
     """Return what a model gives for a block of samples.
 
     Parameters
     ----------
     call : Call
     samples : Dataset
-    first : int
-        Number of the first sample, for messages.
+    rows : sequence of int
+        Numbers of the samples, for messages.
 
     Returns
     -------
@@ -95,21 +100,22 @@ def ask(call: Call, samples: xr.Dataset, first: int) -> Answer:
 
     Raises
     ------
-    SchemaError, UnknownNameError
-        If the model and its samples do not go together at all.
     ModelError
         If a sample fails and ``on_error`` is ``"raise"``; it tells the sample's inputs.
     """
     # Threads of the process that asks are seen to there.
     with one_thread() if call.home not in (None, here()) else nullcontext():
-        return _Asked(call, samples, first).answer()
+        try:
+            return _Asked(call, samples, rows).answer()
+        except (SchemaError, UnknownNameError) as error:
+            return Answer(None, unfit=error)
 
 
 class _Asked:
     """Samples of one block, halved until what fails stands alone."""
 
-    def __init__(self, call: Call, samples: xr.Dataset, first: int) -> None:
-        self.call, self.samples, self.first = call, samples, first
+    def __init__(self, call: Call, samples: xr.Dataset, rows: Sequence[int]) -> None:
+        self.call, self.samples, self.rows = call, samples, rows
         self.size = samples.sizes["sample"]
         self.pieces: list[tuple[slice, xr.Dataset]] = []
         self.failures: dict[int, str] = {}
@@ -122,20 +128,32 @@ class _Asked:
             return Answer(None, self.failures, lost, kind)
         outputs = self.pieces[0][1]
         if len(self.pieces) > 1 or self.failures:
-            layout = self.call.layout or Layout.of(outputs)
-            outputs = layout.joined(self.pieces, self.size)
+            outputs = self._alike().joined(self.pieces, self.size)
         outputs = self._with_status(outputs)
         return Answer(outputs, dict(sorted(self.failures.items())), lost, kind)
+
+    def _alike(self) -> Layout:
+        """Return the layout of all pieces; those that differ from the largest one are tried again for it."""
+        if self.call.layout is None:
+            _, largest = max(self.pieces, key=lambda piece: piece[1].sizes["sample"])
+            layout = Layout.of(largest, getattr(self.call.model, "ragged", ()))
+            self.call = replace(self.call, layout=layout)
+            odd = [rows for rows, part in self.pieces if layout.fault(part)]
+            self.pieces = [(rows, part) for rows, part in self.pieces if rows not in odd]
+            for rows in odd:
+                self._try(rows)
+        assert self.call.layout is not None
+        return self.call.layout
 
     def _try(self, rows: slice) -> None:
         part = self.samples.isel(sample=rows) if rows.stop - rows.start < self.size else self.samples
         try:
             self.pieces.append((rows, _checked(self.call, part)))
             return
-        except (SchemaError, UnknownNameError):
-            raise
         # A script that ends itself must not end the run.
         except (Exception, SystemExit) as error:
+            if isinstance(error, (SchemaError, UnknownNameError)) and not (self.pieces or self.call.layout):
+                raise
             if rows.stop - rows.start == 1:
                 self._failed(rows.start, error)
                 return
@@ -144,7 +162,11 @@ class _Asked:
         self._try(slice(middle, rows.stop))
 
     def _failed(self, place: int, error: BaseException) -> None:
-        text = " ".join(str(error).split())
+        try:
+            text = one_line(str(error))
+        except Exception:
+            # Whatever an error of someone else's does when it is asked.
+            text = ""
         if isinstance(error, InputError):
             # The model saw this one alone.
             text = text.replace(" in sample 0", "", 1)
@@ -153,8 +175,8 @@ class _Asked:
         message = text if plain and text else f"{type(error).__name__}: {text}".removesuffix(": ")
         if self.call.on_error == RAISE:
             raise ModelError(
-                f"the model failed on sample {self.first + place}: {_shortened(message)}; "
-                f"its inputs are {_inputs(self.samples.isel(sample=place))}"
+                f"the model failed on sample {self.rows[place]}: {_shortened(message)}; "
+                f"its inputs are {inputs_of(self.samples.isel(sample=place))}"
             ) from error
         self.failures[place] = _shortened(message)
         if self.kind is None:
@@ -168,13 +190,16 @@ class _Asked:
                 raise SchemaError(
                     f"status of the model has the dims {outputs['status'].dims}: it needs ('sample',)"
                 )
-            if not self.failures and outputs["status"].dtype == np.int8:
+            given = outputs["status"]
+            if not self.failures and given.dtype == np.int8 and "flag_meanings" in given.attrs:
                 return outputs
             status = outputs["status"].values.astype(np.int8)
         else:
             status = np.full(self.size, schema.STATUS["ok"], np.int8)
-            for name, values in outputs.data_vars.items():
-                if name in BOOKS:
+            ragged = set(getattr(self.call.model, "ragged", ()))
+            for name, values in outputs_of(outputs).items():
+                # What others have and this one has not is no failure.
+                if name in BOOKS or not ragged.isdisjoint(values.dims):
                     continue
                 other = [dim for dim in values.dims if dim != "sample"]
                 missing = values.isnull().any(other).values
@@ -197,7 +222,7 @@ def _checked(call: Call, samples: xr.Dataset) -> xr.Dataset:
     """Return the model's outputs, checked, without coords over sample."""
     keep, size = call.keep, samples.sizes["sample"]
     everything = keep is None or not hasattr(call.model, "outcomes")
-    given = call.model(samples) if everything else call.model(samples, keep)
+    given = call.model(samples) if everything else call.model(samples, keep=keep)
     if not isinstance(given, xr.Dataset):
         raise SchemaError(f"the model must return an xarray Dataset, not {type(given).__name__}")
     both = [str(name) for name in given.data_vars if name in samples.variables]
@@ -218,6 +243,10 @@ def _checked(call: Call, samples: xr.Dataset) -> xr.Dataset:
                 f"output {str(name)!r} of the model has the dims {dict(values.sizes)}: "
                 f"it needs 'sample' of length {size}"
             )
+    if "status" in given and not np.isin(given["status"].values, list(schema.STATUS.values())).all():
+        wrong = given["status"].values[~np.isin(given["status"].values, list(schema.STATUS.values()))][0]
+        flags = ", ".join(f"{value} ({name})" for name, value in schema.STATUS.items())
+        raise _FaultError(f"the model gave the status {wrong}: it must be one of {flags}")
     given = _in_order(given, samples)
     if keep is not None:
         missing = [name for name in keep if name not in given]
@@ -266,12 +295,17 @@ def _in_order(given: xr.Dataset, samples: xr.Dataset) -> xr.Dataset:
     return given.assign(bare) if bare else given
 
 
-def _inputs(sample: xr.Dataset) -> str:
-    """Return the values of one sample as text."""
+def inputs_of(sample: xr.Dataset) -> str:
+    """Return the values of one sample as text of limited length.
+
+    Parameters
+    ----------
+    sample : Dataset
+        Without the dim ``sample``.
+    """
     given: Mapping[Any, xr.DataArray] = sample.data_vars
-    return ", ".join(f"{name}={np.array2string(values.values)}" for name, values in given.items()).replace(
-        "\n", ""
-    )
+    text = ", ".join(f"{name}={np.array2string(values.values)}" for name, values in given.items())
+    return _shortened(one_line(text))
 
 
 def _shortened(text: str) -> str:

@@ -16,14 +16,14 @@ import xarray as xr
 
 from hipuq import __version__, schema
 from hipuq.designs import Design, as_design
-from hipuq.errors import InputError, check_name, unknown_name
-from hipuq.evaluation.calling import MARK, ON_ERROR, Call, Model, here
+from hipuq.errors import InputError, ModelError, check_name, unknown_name
+from hipuq.evaluation.calling import MARK, ON_ERROR, RAISE, Call, Model, here, inputs_of
 from hipuq.evaluation.stream import Limit, Stream, Unit, undecided_in
 from hipuq.evaluation.workers import check_travels, workers
 from hipuq.progress import progress_bar
 from hipuq.sampling import check_count
 from hipuq.store.blocks import BlockStore, labels_of, units_of
-from hipuq.store.failures import failure_table
+from hipuq.store.failures import failure_table, part_of
 from hipuq.store.opening import opened
 from hipuq.store.outcomes import load_outcomes
 
@@ -160,11 +160,11 @@ def evaluated(model: Model, samples: xr.Dataset | Design, keep: Iterable[str] | 
         )
     if how.executor == "processes":
         check_travels(model)
-    # Few samples are divided further, so that every core has some.
     run = _Run(model, design, names, min(block, units_of(design.size, block)), how)
     if how.store is None:
         return run.in_memory().assign_attrs(seconds=time.perf_counter() - started)
-    return run.stored(Path(how.store))
+    # One name for one folder, whatever the model makes the current one.
+    return run.stored(Path(os.path.realpath(how.store)))
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,11 @@ class _Run:
 
     def stored(self, folder: Path) -> xr.Dataset:
         how = self.how
-        with opened(folder, self._definition(), self.block, resume=how.resume, replace=how.replace) as target:
+        first = self.design.rows(0, 1)
+        variables = map(str, first.data_vars)
+        with opened(
+            folder, self._definition(), variables, self.block, resume=how.resume, replace=how.replace
+        ) as target:
             try:
                 self._into(target)
             except KeyboardInterrupt:
@@ -202,16 +206,25 @@ class _Run:
                 ) from None
             found = target.folder
         outcomes, size = load_outcomes(found), self.design.size
-        return outcomes if outcomes.sizes["sample"] == size else outcomes.isel(sample=slice(0, size))
+        return outcomes if outcomes.sizes["sample"] == size else part_of(outcomes, slice(0, size))
 
     def _into(self, target: BlockStore) -> None:
         if self.design.given:
             target.labels = labels_of(self.design.rows(0, self.design.size))
             target.check_samples(self.design.rows)
+        lost = sum(unit.lost for unit in target.units.values())
+        if target.failures and self.how.on_error == RAISE:
+            row, message = next(iter(target.failures.items()))
+            inputs = inputs_of(self.design.rows(row, row + 1).isel(sample=0))
+            raise ModelError(
+                f"the model failed on sample {row}, as {target.folder} tells: {message}; its inputs are "
+                f"{inputs}"
+            )
+        Limit(self.how.max_failed, self.design.size, lost, target.done - lost).check(target.failures)
         if target.complete:
             return
-        with self._stream(sum(unit.lost for unit in target.units.values()), target.done) as stream:
-            stream.advance(0, failed=len(target.failures), undecided=target.undecided)
+        with self._stream(lost, target.done) as stream:
+            stream.advance(0, failed=target.failed, undecided=target.undecided)
             if (example := target.example(self.design.rows(0, 1))) is not None:
                 stream.learn(example)
             wanted = [(number, target.rows(number)) for number in target.open_units]
@@ -248,7 +261,7 @@ class _Run:
             "hipuq_version": __version__,
             "model": self._label(),
             "model_options": self._options(),
-            "keep": None if self.keep is None else list(self.keep),
+            "keep": None if self.keep is None else sorted(self.keep),
             **self.design.definition,
         }
 

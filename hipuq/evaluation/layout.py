@@ -10,11 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-
-def outputs_of(given: xr.Dataset) -> dict[Hashable, xr.DataArray]:
-    """Return what a model gave: xarray takes one named like a dim of its own for a coordinate."""
-    named = {name: values for name, values in given.coords.items() if name in values.dims and values.ndim > 1}
-    return {**given.data_vars, **named}
+from hipuq.store.arrays import outputs_of
 
 
 @dataclass(frozen=True)
@@ -70,7 +66,7 @@ class Layout:
                 )
             if any(a != b for a, b, same in zip(lengths_here, lengths, fixed, strict=True) if same):
                 return f"output {str(name)!r} of the model has the lengths {lengths_here}, not {lengths}"
-            if dtype_here.kind != dtype.kind:
+            if dtype_here != dtype:
                 return f"output {str(name)!r} of the model holds {dtype_here}, not {dtype}"
         return ""
 

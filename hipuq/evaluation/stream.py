@@ -104,7 +104,12 @@ class Limit:
             raise kind(
                 f"the model failed on all of the first {self.failed:,} samples; sample {row}: {message}"
             )
+        self.check(failures, kind)
+
+    def check(self, failures: dict[int, str], kind: type[HipuqError] = ModelError) -> None:
+        """Raise an error if too many have failed; it tells the first of these failures."""
         if self.failed > self.share * self.size:
+            row, message = min(failures.items())
             raise (ModelError if self.known else kind)(
                 f"{self.failed:,} of {self.failed + self.known:,} samples failed, more than max_failed = "
                 f"{self.share:g} allows of {self.size:,}; sample {row}: {message}"
@@ -157,12 +162,10 @@ class Stream:
             if unit.left:
                 continue
             waiting.append(unit)
+            # If none ever does, the limit ends the run.
             if self.layout is not None:
                 yield from waiting
                 waiting = []
-        if waiting:
-            row, message = min(waiting[0].failures.items())
-            raise ModelError(f"the model failed on all {self.limit.size:,} samples; sample {row}: {message}")
 
     def _blocks(self, wanted: Iterable[tuple[int, slice]], reuse: Reuse | None) -> Iterator[Any]:
         """Yield calls for the executor: blocks of samples that have no outcome yet."""
@@ -177,9 +180,11 @@ class Stream:
             for start in starts:
                 stop = min(start + self.block, count)
                 places = slice(start, stop) if open_ is None else open_[start:stop]
-                first = rows.start + (start if open_ is None else int(open_[start]))
+                numbers = (
+                    range(rows.start, rows.stop)[places] if open_ is None else rows.start + open_[start:stop]
+                )
                 part = unit.samples.isel(sample=places) if stop - start < unit.size else unit.samples
-                yield (unit, places), ask, (self.call, part, first)
+                yield (unit, places), ask, (self.call, part, numbers)
 
     def _reused(self, unit: Unit, reuse: Reuse) -> NDArray[np.intp]:
         """Give a unit the outcomes that are there, and return the places of the rest."""
@@ -197,11 +202,14 @@ class Stream:
     def _take(self, unit: Unit, places: Places, answer: Answer) -> None:
         """Give a unit what came back."""
         count = len(range(unit.size)[places]) if isinstance(places, slice) else len(places)
-        if self.layout is not None and answer.outputs is not None and self.layout.fault(answer.outputs):
-            # Some of these samples have outputs of another shape: find out which.
+        if self.layout is None:
+            if answer.unfit is not None:
+                raise answer.unfit
+        elif answer.unfit is not None or (answer.outputs is not None and self.layout.fault(answer.outputs)):
+            # Outputs of others are known to be right: find out which of these samples differ.
             part = unit.samples.isel(sample=places)
-            first = unit.rows.start + int(np.arange(unit.size)[places][0])
-            answer = self.workers.now(ask, replace(self.call, layout=self.layout), part, first)
+            numbers = np.arange(unit.rows.start, unit.rows.stop)[places]
+            answer = self.workers.now(ask, replace(self.call, layout=self.layout), part, numbers)
         where = np.arange(unit.rows.start, unit.rows.stop)[places]
         failures = {int(where[place]): message for place, message in answer.failures.items()}
         self.limit.add(failures, answer.lost, count - answer.lost, answer.kind)

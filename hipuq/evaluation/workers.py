@@ -64,7 +64,7 @@ class Workers:
         try:
             for key, function, arguments in calls:
                 waiting.append((key, self._submitted(function, arguments)))
-                if len(waiting) >= AHEAD * self.count():
+                if len(waiting) >= AHEAD * self._count():
                     first, future = waiting.popleft()
                     yield first, _result(future)
             while waiting:
@@ -73,6 +73,12 @@ class Workers:
         finally:
             for _, future in waiting:
                 future.cancel()
+
+    def _count(self) -> int:
+        try:
+            return self.count()
+        except Exception as error:
+            raise _broken(error) from error
 
     def now(self, function: Callable[..., T], *arguments: Any) -> T:
         """Return what one call gives."""

@@ -11,7 +11,7 @@ import itertools
 import os
 import warnings
 import zlib
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from hipuq.store.ledger import Files
+from hipuq.store.ledger import HALF, Files
 
 
 def open_arrays(folder: Path) -> xr.Dataset:
@@ -28,6 +28,12 @@ def open_arrays(folder: Path) -> xr.Dataset:
     with quiet():
         arrays: xr.Dataset = xr.open_zarr(folder, chunks=None, consolidated=False)
     return arrays.drop_encoding()
+
+
+def outputs_of(given: xr.Dataset) -> dict[Hashable, xr.DataArray]:
+    """Return what a model gave: xarray takes one named like a dim of its own for a coordinate."""
+    named = {name: values for name, values in given.coords.items() if name in values.dims and values.ndim > 1}
+    return {**given.data_vars, **named}
 
 
 @contextmanager
@@ -69,15 +75,15 @@ def write_chunks(folder: Path, name: str, array: Any, values: NDArray[Any], axis
         starts = [k * length for k, length in zip(place, lengths, strict=True)]
         part = values[tuple(slice(a, a + length) for a, length in zip(starts, lengths, strict=True))]
         if part.shape != lengths:
-            # The last chunk of an array is as long as all others.
-            whole = np.zeros(lengths, array.dtype)
+            # All chunks of an array are equally long: what is not there yet, or nowhere, is missing.
+            whole = np.full(lengths, np.nan if array.dtype.kind in "fc" else 0, array.dtype)
             whole[tuple(slice(0, n) for n in part.shape)] = part
             part = whole
         part = np.ascontiguousarray(part, array.dtype)
         data = bytes(codec.encode(part)) if codec is not None else part.tobytes()
         key = [*place[:axis], number, *place[axis + 1 :]]
         file = f"{name}/{'.'.join(map(str, key))}"
-        half = folder / f"{file}.hipuq-part"
+        half = folder / f"{file}{HALF}"
         half.write_bytes(data)
         os.replace(half, folder / file)
         files[file] = (len(data), zlib.crc32(data))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,10 @@ import numpy as np
 import xarray as xr
 
 from hipuq.errors import StoreError
-from hipuq.store.arrays import open_arrays, quiet, write_chunks
-from hipuq.store.failures import FAILURES, failure_table
-from hipuq.store.ledger import ABOUT, END, Files, Unit, add_unit, files_of
+from hipuq.store.arrays import open_arrays, outputs_of, quiet, write_chunks
+from hipuq.store.failures import FAILURES, MOST, failure_table
+from hipuq.store.guarding import check_array_name
+from hipuq.store.ledger import ABOUT, END, START, Files, Unit, add_unit, files_of
 from hipuq.store.reporting import reported
 from hipuq.store.reuse import Reuse
 
@@ -26,8 +28,11 @@ UNITS, STEPS, STEP = 64, 64, 1024
 ATTRS = "hipuq.attrs.json"
 """Attributes as xarray wrote them at first: the last ones replace them, and could be cut off."""
 
-METADATA = ".zmetadata"
-"""What readers look at first: all metadata together."""
+ZATTRS, METADATA = ".zattrs", ".zmetadata"
+"""Attributes, and what readers look at first: all metadata together."""
+
+CHUNK_BYTES = 2**26
+"""Largest chunk [byte], if it can be divided."""
 
 
 class BlockStore:
@@ -64,7 +69,7 @@ class BlockStore:
     @property
     def done(self) -> int:
         """Number of samples in complete units."""
-        rows = [self.rows(number) for number in self.units if number != END]
+        rows = [self.rows(number) for number in self.units if number >= 0]
         return sum(one.stop - one.start for one in rows)
 
     @property
@@ -73,8 +78,13 @@ class BlockStore:
         return END in self.units and not self.open_units
 
     @property
+    def failed(self) -> int:
+        """Number of failed samples."""
+        return sum(unit.failed for unit in self.units.values())
+
+    @property
     def failures(self) -> dict[int, str]:
-        """Row of each failed sample -> message, in order."""
+        """Row of failed samples -> message, in order, as many as are kept."""
         return dict(sorted(pair for unit in self.units.values() for pair in unit.failures.items()))
 
     @property
@@ -99,13 +109,13 @@ class BlockStore:
         samples : Dataset
             Any samples of the design: what they hold is no output.
         """
-        numbers = [number for number in self.units if number != END]
+        numbers = [number for number in self.units if number >= 0]
         if not numbers:
             return None
         row = self.rows(min(numbers)).start
         there = open_arrays(self.folder)
-        there = there.drop_vars([name for name in there.variables if name in samples.variables])
-        named = [name for name, values in there.data_vars.items() if "sample" in values.dims]
+        there = there.drop_vars([name for name in (*samples.variables, *FAILURES) if name in there.variables])
+        named = [name for name, values in outputs_of(there).items() if "sample" in values.dims]
         example: xr.Dataset = there[named].isel(sample=slice(row, row + 1)).load()
         return example
 
@@ -122,26 +132,28 @@ class BlockStore:
         StoreError
             If a value differs.
         """
-        numbers = sorted(number for number in self.units if number != END)
-        if not numbers:
-            return
         with reported("read", self.folder):
-            there = open_arrays(self.folder)
-            for rows in map(self.rows, numbers):
-                for name, values in samples(rows.start, rows.stop).data_vars.items():
-                    old = there[name].isel(sample=rows) if name in there else None
-                    if old is None or old.dims != values.dims or old.shape != values.shape:
-                        raise StoreError(f"the store at {self.folder} is of other samples: {name} differs")
-                    differs = (old.values != values.values).reshape(values.shape)
-                    if differs.any():
-                        axis = values.dims.index("sample")
-                        place = np.argwhere(np.moveaxis(differs, axis, 0))[0]
-                        index = (*place[1 : axis + 1], place[0], *place[axis + 1 :])
-                        raise StoreError(
-                            f"the store at {self.folder} is of other samples: {name} of sample "
-                            f"{rows.start + place[0]} is {old.values[index]} there, "
-                            f"{values.values[index]} here"
-                        )
+            there = open_arrays(self.folder) if any(number >= 0 for number in self.units) else xr.Dataset()
+            for rows in (self.rows(number) for number in sorted(self.units) if number >= 0):
+                for name, values in samples(rows.start, rows.stop).variables.items():
+                    if "sample" in values.dims and values.dtype.kind in "biufc":
+                        self._compare(str(name), there.variables.get(name), values, rows)
+
+    def _compare(self, name: str, old: xr.Variable | None, values: xr.Variable, rows: slice) -> None:
+        """Raise a StoreError unless values over some rows are those that are there."""
+        what = f"the store at {self.folder} is of other samples: {name}"
+        if old is None or old.dims != values.dims:
+            raise StoreError(f"{what} differs")
+        there = old.isel(sample=rows).transpose("sample", ...).values
+        here = values.transpose("sample", ...).values
+        if there.shape != here.shape:
+            raise StoreError(f"{what} differs")
+        differs = (there != here) & ~((there != there) & (here != here))
+        if differs.any():
+            place = tuple(np.argwhere(differs)[0])
+            raise StoreError(
+                f"{what} of sample {rows.start + place[0]} is {there[place]} there, {here[place]} here"
+            )
 
     def write(
         self, number: int, outcomes: xr.Dataset, failures: Mapping[int, str], lost: int, undecided: int
@@ -168,14 +180,19 @@ class BlockStore:
             if not self._arrays:
                 self._open(outcomes)
             files: Files = {}
+            longer = False
             for name, array in self._arrays.items():
                 values, axis = outcomes[name].values, outcomes[name].dims.index("sample")
                 shape = (*values.shape[:axis], self.size, *values.shape[axis + 1 :])
                 if (longest := tuple(np.maximum(shape, array.shape).tolist())) != array.shape:
                     array.resize(longest)
+                    longer = True
                 files |= write_chunks(self.folder, name, array, values, axis, number)
+            if longer:
+                self._note(START)
             now = time.perf_counter()
-            unit = Unit(number, files, dict(failures), lost, undecided, now - self._began)
+            kept = dict(itertools.islice(failures.items(), MOST))
+            unit = Unit(number, files, kept, len(failures), lost, undecided, now - self._began)
             add_unit(self.folder, unit)
             self.units[number], self._began = unit, now
 
@@ -190,21 +207,29 @@ class BlockStore:
         import zarr
 
         with self._writing():
+            drop_table(self.folder)
             if failures := self.failures:
                 table = failure_table(failures)
-                for name in FAILURES:
-                    shutil.rmtree(self.folder / name, ignore_errors=True)
                 with quiet():
                     table.to_zarr(self.folder, mode="a", zarr_format=2, consolidated=False)
             whole = json.loads((self.folder / ATTRS).read_text()) | dict(attrs)
-            (self.folder / ".zattrs").write_text(json.dumps(whole, indent=1))
+            (self.folder / ZATTRS).write_text(json.dumps(whole, indent=1, default=plain))
             with quiet():
                 zarr.consolidate_metadata(str(self.folder), zarr_format=2)
-            unit = Unit(
-                END, files_of(self.folder, [".zattrs", ".zmetadata", *_chunks(self.folder, FAILURES)])
-            )
-            add_unit(self.folder, unit)
-            self.units[END] = unit
+            self._note(END)
+
+    def _note(self, number: int) -> None:
+        """Note in the ledger what was written beside the units: at first, or at the end."""
+        arrays = [file for name in self._arrays for file in (f"{name}/.zarray", f"{name}/.zattrs")]
+        if number == END:
+            names = [ZATTRS, METADATA, *files_in(self.folder, FAILURES)]
+        else:
+            rest = [path.name for path in self.folder.iterdir() if path.is_dir()]
+            fixed = set(rest) - self._arrays.keys() - set(FAILURES)
+            names = [*arrays, *files_in(self.folder, sorted(fixed))]
+        unit = Unit(number, files_of(self.folder, names))
+        add_unit(self.folder, unit)
+        self.units[number] = unit
 
     def _open(self, outcomes: xr.Dataset) -> None:
         """Open the arrays, or make them like a unit's outcomes."""
@@ -213,18 +238,21 @@ class BlockStore:
             for name, values in outcomes.variables.items()
             if "sample" in values.dims and values.dtype.kind in "biufc"
         ]
-        if not any(number != END for number in self.units):
+        new = not any(number >= 0 for number in self.units)
+        if new:
             clear(self.folder)
+            self.units.clear()
             self._make(outcomes, names)
         group = _group(self.folder)
         self._arrays = {name: group[name] for name in names}
+        if new:
+            self._note(START)
 
     def _make(self, outcomes: xr.Dataset, names: list[str]) -> None:
         encoding = {}
         for name in names:
-            values = outcomes[name]
-            lengths = [self.chunk if dim == "sample" else max(1, n) for dim, n in values.sizes.items()]
-            encoding[name] = {"chunks": tuple(lengths)}
+            check_array_name(name)
+            encoding[name] = {"chunks": chunks_of(outcomes[name], self.chunk)}
         empty = outcomes.drop_vars(self.labels.variables, errors="ignore").isel(sample=slice(0, 0))
         empty = empty.drop_attrs(deep=False).drop_encoding()
         with quiet():
@@ -239,7 +267,8 @@ class BlockStore:
         attrs = dict(group.attrs)
         # Where xarray looks for coordinates that no variable names.
         coordinates = [str(attrs.get("coordinates", "")), *map(str, self.labels.variables)]
-        (self.folder / ATTRS).write_text(json.dumps(attrs | {"coordinates": " ".join(coordinates).strip()}))
+        attrs["coordinates"] = " ".join(coordinates).strip()
+        (self.folder / ATTRS).write_text(json.dumps(attrs, default=plain))
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -283,8 +312,32 @@ def clear(folder: Path) -> None:
             shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
 
 
-def _chunks(folder: Path, names: tuple[str, ...]) -> list[str]:
-    return [f"{name}/{file.name}" for name in names for file in sorted((folder / name).glob("[0-9]*"))]
+def drop_table(folder: Path) -> None:
+    """Remove the table of failures."""
+    for name in FAILURES:
+        shutil.rmtree(folder / name, ignore_errors=True)
+
+
+def files_in(folder: Path, names: Iterable[str]) -> list[str]:
+    """Return the files of arrays, as paths in the store."""
+    return [f"{name}/{file.name}" for name in names for file in sorted((folder / name).glob("*"))]
+
+
+def chunks_of(values: xr.DataArray, length: int) -> tuple[int, ...]:
+    """Return the lengths of chunks: that of a unit over ``sample``, else whole unless that is large."""
+    lengths = [length if dim == "sample" else max(1, n) for dim, n in values.sizes.items()]
+    while np.prod(lengths, dtype=float) * values.dtype.itemsize > CHUNK_BYTES:
+        other = [k for k, dim in enumerate(values.dims) if dim != "sample" and lengths[k] > 1]
+        if not other:
+            break
+        longest = max(other, key=lambda k: lengths[k])
+        lengths[longest] = -(-lengths[longest] // 2)
+    return tuple(lengths)
+
+
+def plain(value: Any) -> Any:
+    """Return an attribute as JSON has it, one of numpy among them."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
 def _group(folder: Path) -> Any:

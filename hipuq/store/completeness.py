@@ -29,7 +29,7 @@ def missing_in(folder: Path) -> str:
     if done < size or END not in units:
         return f"it is not complete, {done:,} of {size:,} samples are there"
     for number, unit in units.items():
-        if not as_they_were(folder, unit.files, whole=number == END):
+        if not as_they_were(folder, unit.files, whole=number < 0):
             return "files in it are missing or damaged"
     return ""
 

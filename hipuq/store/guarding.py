@@ -35,7 +35,7 @@ INDEX_MAXIMUM = 2**30
 ARRAY_MAXIMUM = 2**44
 """Largest array [byte]."""
 
-_NAME = re.compile(r"[A-Za-z0-9_][^/\\:\x00-\x1f\x7f]*")
+_NAME = re.compile(r"\w[^/\\:\x00-\x1f\x7f]*")
 _PLACE = re.compile(r"(?:(?P<name>[^/]*)/)?(?P<kind>\.zarray|\.zattrs|\.zgroup)")
 _DTYPE = re.compile(r"[<>|]([biufcU])([0-9]{1,6})", re.ASCII)
 _TEXT = "|O"
@@ -141,3 +141,22 @@ def _check_array(name: str, own: Mapping[str, Any]) -> None:
 
 def _is_length(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**63
+
+
+def check_array_name(name: str) -> None:
+    """Raise a StoreError unless an array of a store may have a name.
+
+    Parameters
+    ----------
+    name : str
+
+    Raises
+    ------
+    StoreError
+        If it leads elsewhere, or begins with a sign.
+    """
+    if not _NAME.fullmatch(name):
+        raise StoreError(
+            f"{one_line(repr(name))} cannot be stored: a name begins with a letter, a digit or '_' and has "
+            "no slash and no colon; rename it"
+        )

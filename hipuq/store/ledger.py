@@ -7,6 +7,7 @@ line was written and whose data was not, as after a power cut, is found out, and
 from __future__ import annotations
 
 import json
+import os
 import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -18,11 +19,14 @@ from hipuq.errors import StoreError
 ABOUT, LINES = "hipuq.json", "hipuq.jsonl"
 """Files of a store: what it is of, and its ledger."""
 
-END = -1
-"""Number of the unit that stands for what is written at the end."""
+START, END = -2, -1
+"""Numbers of the units that stand for what is written at first and at the end."""
 
-LARGEST = 2**28
+LARGEST = 2**30
 """Bytes of these files that are read, at most."""
+
+HALF = ".hipuq-part"
+"""End of the name of a file that is being written."""
 
 Files = dict[str, tuple[int, int]]
 """Path inside the store -> size in bytes and CRC-32."""
@@ -35,10 +39,12 @@ class Unit:
     Attributes
     ----------
     number : int
-        From 0; -1 stands for what is written at the end.
+        From 0; `START` and `END` stand for what is beside the units.
     files : dict
     failures : dict
-        Row of a failed sample -> message.
+        Row of a failed sample -> message, as many as are kept.
+    failed : int
+        Number of failed samples.
     lost : int
         How many of them gave nothing; the others gave NaN.
     undecided : int
@@ -50,6 +56,7 @@ class Unit:
     number: int
     files: Files
     failures: dict[int, str] = field(default_factory=dict)
+    failed: int = 0
     lost: int = 0
     undecided: int = 0
     seconds: float = 0.0
@@ -61,7 +68,8 @@ class Unit:
             {
                 "unit": self.number,
                 "files": {name: list(pair) for name, pair in self.files.items()},
-                "failed": failures,
+                "failures": failures,
+                "failed": self.failed,
                 "lost": self.lost,
                 "undecided": self.undecided,
                 "seconds": self.seconds,
@@ -80,9 +88,11 @@ class Unit:
         try:
             found = json.loads(line)
             files = {_inside(name): (int(size), int(crc)) for name, (size, crc) in found["files"].items()}
-            failures = {int(row): str(message) for row, message in found["failed"]}
-            counts = int(found["lost"]), int(found["undecided"])
-            return cls(int(found["unit"]), files, failures, *counts, float(found["seconds"]))
+            failures = {int(row): str(message) for row, message in found["failures"]}
+            counts = [int(found[name]) for name in ("failed", "lost", "undecided")]
+            failed, lost, undecided = counts
+            seconds = float(found["seconds"])
+            return cls(int(found["unit"]), files, failures, failed, lost, undecided, seconds)
         except (KeyError, TypeError, AttributeError, RecursionError, OverflowError) as error:
             raise ValueError("not a line of a ledger") from error
 
@@ -97,12 +107,22 @@ def read_about(folder: Path) -> dict[str, Any]:
     """
     try:
         found = json.loads(_text(folder / ABOUT))
-        size, chunk = found["definition"]["samples"], found["chunk"]
-        if not all(type(n) is int and 0 < n < 2**53 for n in (size, chunk)):
+        definition = found["definition"]
+        counts = [definition["samples"], found["chunk"], *definition.get("rounds", [])]
+        if not all(type(n) is int and 0 < n < 2**53 for n in counts):
             raise ValueError("it has no samples")
+        if not isinstance(found["variables"], list):
+            raise ValueError("it has no variables")
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise StoreError(f"{folder} is no store of hipuq that could go on: {ABOUT} cannot be used") from error
     return dict(found)
+
+
+def write_about(folder: Path, about: Mapping[str, Any]) -> None:
+    """Write what a store is of, whole or not at all."""
+    half = folder / f"{ABOUT}{HALF}"
+    half.write_text(json.dumps(about, indent=1))
+    os.replace(half, folder / ABOUT)
 
 
 def read_units(folder: Path) -> dict[int, Unit]:

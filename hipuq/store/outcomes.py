@@ -12,6 +12,7 @@ from hipuq.errors import StoreError
 from hipuq.store.completeness import is_store, missing_in
 from hipuq.store.guarding import check_store
 from hipuq.store.ledger import ABOUT
+from hipuq.store.lock import locked
 from hipuq.store.reporting import reported
 
 
@@ -30,8 +31,11 @@ def save_outcomes(outcomes: xr.Dataset, path: str | os.PathLike[str]) -> None:
         If it cannot be written, or something else is there.
     """
     folder = Path(path)
-    part, old = (folder.with_name(f".{folder.name}.hipuq-{end}") for end in ("part", "old"))
-    with reported("write", folder):
+    part, old = (folder.with_name(f".{folder.name}.hipuq-{end}") for end in ("part", "saved"))
+    with locked(folder), reported("write", folder):
+        if old.exists() and not folder.exists():
+            # A process was killed between the two names.
+            old.rename(folder)
         if folder.exists() and not is_store(folder):
             raise StoreError(f"cannot write {folder}: something that is not a Zarr store is there")
         folder.parent.mkdir(parents=True, exist_ok=True)

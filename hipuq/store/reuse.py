@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from hipuq.store.arrays import open_arrays
+from hipuq.store.arrays import open_arrays, outputs_of
 from hipuq.store.ledger import Unit
 
 _MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
@@ -30,7 +30,8 @@ class Reuse:
     """
 
     def __init__(self, folder: Path, chunk: int, units: Mapping[int, Unit]) -> None:
-        self._outcomes = open_arrays(folder)
+        whole = open_arrays(folder)
+        self._outcomes = whole[[name for name, own in whole.variables.items() if "sample" in own.dims]]
         size = self._outcomes.sizes["sample"]
         self._rows = [slice(k * chunk, min((k + 1) * chunk, size)) for k in sorted(units)]
         self._failures = {row: text for unit in units.values() for row, text in unit.failures.items()}
@@ -71,14 +72,14 @@ class Reuse:
             new, old = (_bits(one[name]) for one in (samples.isel(sample=places), there))
             same &= (new == old).all(axis=1)
         there, places, rows = there.isel(sample=same), places[same], rows[same]
-        outputs = there.drop_vars([name for name in there.variables if name in samples.variables])
-        kept = [name for name, values in outputs.data_vars.items() if "sample" in values.dims]
+        kept = [name for name in outputs_of(there) if name not in samples.variables]
         failures = {
             int(place): self._failures[row]
             for place, row in zip(places, rows.tolist(), strict=True)
             if row in self._failures
         }
-        return places, outputs[kept], failures
+        rest = [name for name in there.variables if "sample" in there[name].dims and name not in kept]
+        return places, there.drop_vars(rest), failures
 
 
 def _bits(values: xr.DataArray) -> NDArray[np.uint64]:

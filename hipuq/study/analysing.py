@@ -104,9 +104,11 @@ def _tell(analysis: Analysis, whole: xr.Dataset, store: Path, say: Callable[[str
         f"{analysis.name}: {whole.sizes['sample']:,} evaluations of {analysis.model.label} in "
         f"{whole.attrs['seconds']:.1f} s, {counts['undecided']:,} undecided"
     )
+    if counts["failed"]:
+        line += f", {counts['failed']:,} failed"
     if "failure_message" in whole:
         row, message = (whole[name].values[0] for name in ("failed_sample", "failure_message"))
-        line += f", {counts['failed']:,} failed (sample {row}: {message}; all of them in {store})"
+        line += f" (sample {row}: {message}; more in {store})"
     say(line)
 
 

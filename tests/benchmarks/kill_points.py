@@ -2,14 +2,17 @@
 
     python tests/benchmarks/kill_points.py [POINTS] [SEED]
 
-A point is an event of writing: before an array of a unit is written, after it, in the middle of a line of a
-ledger, between units, while metadata are written, between analyses, while results are written. The process
-ends there by SIGKILL; at every second point the file written last is cut in half first, as by a power cut.
-Runs and resumed runs are processes of their own. The exit code is 1 if any end differs.
+A point is an event of writing in the output folder: before a file is written, in the middle of it, after it;
+the same for lines of a ledger and folders that are removed; before and after something is renamed,
+metadata are gathered, results are saved. The process ends there by SIGKILL; at every second point the file
+written last is cut in half first, as by a power cut. Points are drawn over two scenarios: a study from the
+beginning, and one that is complete and gets more samples. Runs and resumed runs are processes of their own.
+The exit code is 1 if any end differs.
 """
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import random
 import shutil
@@ -17,16 +20,18 @@ import signal
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import xarray as xr
 import zarr
 
 import hipuq
+import hipuq._salib
 import hipuq.store.blocks
 import hipuq.store.ledger
-import hipuq.store.results
-from hipuq.study import load_study, run_study
+from hipuq.store import save_results
+from hipuq.study import Study, load_study, run_study
 
 STUDY = """
 title = "Killed"
@@ -46,48 +51,92 @@ distribution = "uniform"
 lower = 1.0
 upper = 2.0
 
+[report]
+damping_samples = 0
+fragility_points = 21
+
 [[analysis]]
 name = "draws"
 method = "monte_carlo"
-n = 5000
-of = ["any_unstable", "margin"]
+n = 3000
+of = "margin"
 
 [[analysis]]
 name = "causes"
 method = "sobol"
-n = 1024
+n = 512
 of = "margin"
 options = { resamples = 20 }
+
+[[analysis]]
+name = "integrated"
+method = "monte_carlo"
+n = 300
+of = "probability"
+integrate_friction = true
+
+[[analysis]]
+name = "surrogate"
+method = "chaos"
+n = 64
+of = "margin"
+options = { correction = 128, degree = 2, held_out = 0.2, population = 2048 }
 """
+
+LARGER = STUDY.replace("n = 3000", "n = 5000")
 
 
 class Countdown:
-    """Events until the process ends itself; without a number they are counted."""
+    """Events of writing in a folder until the process ends itself; without a number they are counted."""
 
-    def __init__(self, left: int | None, torn: bool, folder: Path) -> None:
-        self.left, self.torn, self.folder, self.seen = left, torn, folder, 0
+    def __init__(self, folder: Path, left: int | None = None, torn: bool = False) -> None:
+        self.folder, self.left, self.torn = folder, left, torn
+        # Shared, so that who forks a process knows how many there were.
+        self.seen = multiprocessing.Value("l", 0)
 
     def event(self) -> None:
-        self.seen += 1
-        if self.seen != self.left:
-            return
-        files = [path for path in self.folder.rglob("*") if path.is_file()]
-        if self.torn and files:
-            last = max(files, key=lambda path: path.stat().st_mtime_ns)
-            os.truncate(last, last.stat().st_size // 2)
-        os.kill(os.getpid(), signal.SIGKILL)
+        with self.seen.get_lock():
+            self.seen.value += 1
+            if self.seen.value != self.left:
+                return
+            files = [path for path in self.folder.rglob("*") if path.is_file()]
+            if self.torn and files:
+                last = max(files, key=lambda path: path.stat().st_mtime_ns)
+                os.truncate(last, last.stat().st_size // 2)
+            os.kill(os.getpid(), signal.SIGKILL)
 
-    def around(self, owner: object, name: str) -> None:
-        """Make events of the begin and the end of a function."""
+    def around(self, owner: object, name: str, half: Callable[..., None] | None = None) -> None:
+        """Make events of the begin and the end of a function of a path, and of the middle.
+
+        What `half` does must not matter once the function has done the whole.
+        """
         function: Callable[..., object] = getattr(owner, name)
 
-        def counted(*args: object, **kwargs: object) -> object:
-            self.event()
-            result = function(*args, **kwargs)
-            self.event()
+        def counted(path: object, *args: object, **kwargs: object) -> object:
+            inside = not isinstance(path, str | Path) or Path(path).is_relative_to(self.folder)
+            if inside:
+                self.event()
+                if half is not None:
+                    half(path, *args)
+                    self.event()
+            result = function(path, *args, **kwargs)
+            if inside:
+                self.event()
             return result
 
         setattr(owner, name, counted)
+
+
+def half_file(path: Path, data: str | bytes, *_: object) -> None:
+    data = data.encode() if isinstance(data, str) else data
+    with path.open("wb") as stream:
+        stream.write(data[: len(data) // 2])
+
+
+def half_folder(path: str | Path, *_: object) -> None:
+    files = sorted(file for file in Path(path).rglob("*") if file.is_file())
+    for file in files[: len(files) // 2]:
+        file.unlink()
 
 
 def half_lines(countdown: Countdown) -> None:
@@ -101,29 +150,74 @@ def half_lines(countdown: Countdown) -> None:
             stream.write(line[len(line) // 2 :])
 
     hipuq.store.blocks.add_unit = add_unit
+    countdown.around(hipuq.store.blocks, "add_unit")
 
 
-def run(study: Path, out: Path, countdown: Countdown, *, resume: bool) -> None:
-    half_lines(countdown)
-    countdown.around(zarr.Array, "__setitem__")
-    countdown.around(zarr, "consolidate_metadata")
-    countdown.around(hipuq.store.blocks, "files_of")
-    for name in ("save_results", "add_results"):
-        countdown.around(sys.modules["hipuq.study.running"], name)
-    run_study(load_study(study), out, resume=resume, progress=False, n_jobs=2)
+def run(study: Study, out: Path, countdown: Countdown | None = None, *, resume: bool) -> None:
+    if countdown is not None:
+        half_lines(countdown)
+        for name in ("save_results", "add_results"):
+            countdown.around(sys.modules["hipuq.study.running"], name)
+        countdown.around(zarr, "consolidate_metadata")
+        countdown.around(os, "replace")
+        countdown.around(Path, "rename")
+        countdown.around(Path, "write_bytes", half_file)
+        countdown.around(Path, "write_text", half_file)
+        countdown.around(shutil, "rmtree", half_folder)
+    run_study(study, out, resume=resume, progress=False, n_jobs=2)
 
 
-def in_a_process(action: Callable[[], None]) -> int:
-    """Return how a process that does something ended: 0, or the number of a signal."""
+def in_a_process(action: Callable[[], object]) -> int:
+    """Return how a process that does something ended: 0, or the signal."""
     child = os.fork()
     if not child:
         code = 1
         try:
             action()
             code = 0
+        except Exception as error:
+            print(f"{type(error).__name__}: {error}", flush=True)
         finally:
             os._exit(code)
     return os.waitpid(child, 0)[1]
+
+
+@dataclass
+class Scenario:
+    """A study; output that a run goes on from, if any; output of a run from the beginning, not cut off."""
+
+    name: str
+    study: Study
+    begun: Path | None
+    whole: Path
+
+    def run(self, out: Path, countdown: Countdown) -> int:
+        """Return how a run ended."""
+        shutil.rmtree(out, ignore_errors=True)
+        if self.begun is not None:
+            shutil.copytree(self.begun, out)
+        return in_a_process(lambda: run(self.study, out, countdown, resume=self.begun is not None))
+
+    def events(self, out: Path) -> int:
+        """Return the number of events of a run, whose output is left."""
+        countdown = Countdown(out)
+        assert self.run(out, countdown) == 0, f"{self.name} cannot be run"
+        return countdown.seen.value
+
+    def differs(self, out: Path, place: int, torn: bool) -> str:
+        """Return in what a run that is killed at an event and resumed differs from one that was not."""
+        killed = self.run(out, Countdown(out, place, torn))
+        ended = in_a_process(lambda: run(self.study, out, resume=True))
+        if killed != signal.SIGKILL or ended != 0:
+            return f"ended with {killed}, {ended}"
+        told = out.with_name("why")
+
+        def compared() -> None:
+            one, other = contents(self.whole), contents(out)
+            differ = [name for name in one if name not in other or not one[name].identical(other[name])]
+            told.write_text(", ".join(differ) + ("" if one.keys() == other.keys() else " names differ"))
+
+        return told.read_text() if in_a_process(compared) == 0 else "cannot be read"
 
 
 def contents(out: Path) -> dict[str, xr.Dataset]:
@@ -139,50 +233,34 @@ def contents(out: Path) -> dict[str, xr.Dataset]:
     return found
 
 
+def study_of(text: str, folder: Path) -> Study:
+    file = folder / "study.toml"
+    file.write_text(text)
+    return load_study(file)
+
+
 def main(points: int, seed: int) -> int:
     draw = random.Random(seed)
     with tempfile.TemporaryDirectory() as name:
         top = Path(name)
-        study = top / "killed" / "study.toml"
-        study.parent.mkdir()
-        study.write_text(STUDY)
-        told = top / "events"
-
-        def counted() -> None:
-            countdown = Countdown(None, False, top / "whole")
-            run(study, top / "whole", countdown, resume=False)
-            told.write_text(str(countdown.seen))
-
-        assert in_a_process(counted) == 0
-        events, wrong = int(told.read_text()), 0
-        places = sorted(draw.sample(range(1, events + 1), min(points, events)))
-        for number, place in enumerate(places):
-            out, torn = top / "cut", bool(number % 2)
-            shutil.rmtree(out, ignore_errors=True)
-            killed = in_a_process(
-                lambda out=out, place=place, torn=torn: run(
-                    study, out, Countdown(place, torn, out), resume=False
-                )
-            )
-            ended = in_a_process(lambda out=out: run(study, out, Countdown(None, False, out), resume=True))
-            why = "" if killed == signal.SIGKILL and ended == 0 else f"ended with {killed}, {ended}; "
-            if not why:
-                why = in_another(top / "whole", out, top / "why")
+        # What this loads no process of a run has to load again.
+        save_results(xr.Dataset({"flag": ("x", [True])}), top / "flag.nc")
+        hipuq.load_results(top / "flag.nc")
+        new = Scenario("new", study_of(STUDY, top), None, top / "small")
+        more = Scenario("more samples", study_of(LARGER, top), new.whole, top / "large")
+        events = {new.name: new.events(new.whole), more.name: more.events(top / "cut")}
+        assert in_a_process(lambda: run(more.study, more.whole, resume=False)) == 0
+        every = [(one, place + 1) for one in (new, more) for place in range(events[one.name])]
+        chosen = sorted(draw.sample(range(len(every)), min(points, len(every))))
+        wrong = 0
+        for number, (one, place) in enumerate(every[k] for k in chosen):
+            torn = bool(number % 2)
+            why = one.differs(top / "cut", place, torn)
             wrong += bool(why)
-            print(f"event {place} of {events}{', torn' if torn else ''}: {why or 'the same'}", flush=True)
-        print(f"{len(places) - wrong} of {len(places)} resumed runs ended as one that was not cut off")
+            words = f"{one.name}, event {place} of {events[one.name]}{', torn' if torn else ''}"
+            print(f"{words}: {why or 'the same'}", flush=True)
+        print(f"{len(chosen) - wrong} of {len(chosen)} resumed runs ended as one that was not cut off")
         return int(wrong > 0)
-
-
-def in_another(whole: Path, cut: Path, told: Path) -> str:
-    """Compare two outputs in a process of its own; return in what they differ."""
-
-    def compared() -> None:
-        one, other = contents(whole), contents(cut)
-        differ = [name for name in one if name not in other or not one[name].identical(other[name])]
-        told.write_text(", ".join(differ) + ("" if one.keys() == other.keys() else " names differ"))
-
-    return told.read_text() if in_a_process(compared) == 0 else "cannot be read"
 
 
 if __name__ == "__main__":
