@@ -1,5 +1,5 @@
 """``python -m hipuq`` is the command line."""
 
-from hipuq.cli import main
+from hipuq.cli import command
 
-main()
+command()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import logging
+import os
+import socket
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,8 +24,11 @@ app = typer.Typer(
 
 _DEBUG = False
 
-CONNECT = "10s"
-"""How long to look for the scheduler of a cluster."""
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as of a shell."""
+
+CONNECT = 10.0
+"""Seconds for which the scheduler of a cluster is looked for."""
 
 
 @app.callback()
@@ -60,6 +66,9 @@ def run(
     max_failed: Annotated[
         float, typer.Option("--max-failed", help="Share of the samples of an analysis that may fail.")
     ] = 0.5,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="With --resume, evaluate samples that failed again.")
+    ] = False,
     dry_run: Annotated[
         bool,
         typer.Option(
@@ -107,11 +116,12 @@ def run(
                 executor=executor,
                 on_error=on_error,
                 max_failed=max_failed,
+                retry_failed=retry_failed,
                 say=typer.echo,
             )
     except KeyboardInterrupt as stop:
         what = str(stop).partition(";")[0] or f"what was complete is in {folder}"
-        _fail(f"interrupted: {what}; go on with --resume", 130)
+        _fail(f"interrupted: {what}; go on with --resume", INTERRUPTED)
     from hipuq.report.page import write_report
 
     page = write_report(tree, folder)
@@ -206,15 +216,39 @@ def _executor(processes: bool, dask: str | None) -> Iterator[object]:
         raise InputError("--processes and --dask exclude each other: give one of them")
     try:
         from distributed import Client
+        from distributed.comm.addressing import get_address_host_port
     except ImportError as error:
         raise InputError("--dask needs dask.distributed: install hipuq[dask]") from error
+    # What it logs of a connection that is lost, the error says in a line.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
+        # A client that never found its scheduler would look for it again when it is thrown away.
+        with socket.create_connection(get_address_host_port(dask, strict=True), CONNECT):
+            pass
         # Not the default one: xarray would take its locks for writing files.
         client: Any = Client(dask, timeout=CONNECT, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, TimeoutError, ValueError, TypeError) as error:
         raise StoreError(f"there is no dask scheduler at {dask!r}: {error}") from error
     with client:
         yield client
+
+
+def command() -> None:
+    """Run the command line as a program: after Ctrl-C it ends at once, whatever a model is still doing."""
+    try:
+        main()
+    except SystemExit as end:
+        if end.code != INTERRUPTED:
+            raise
+        import multiprocessing
+
+        if children := multiprocessing.active_children():
+            for child in children:
+                child.terminate()
+            raise
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(INTERRUPTED)
 
 
 def main() -> None:

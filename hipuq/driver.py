@@ -137,6 +137,7 @@ def run(
     resume: bool = False,
     on_error: str = "mark",
     max_failed: float = MAX_FAILED,
+    retry_failed: bool = False,
     **options: Any,
 ) -> xr.Dataset:
     """Design, evaluate and estimate in one call.
@@ -155,7 +156,7 @@ def run(
         Name of the outcome to analyse; nothing else is evaluated.
     rng : int or Generator, optional
         Seed.
-    n_jobs, executor, progress, store, resume, on_error, max_failed
+    n_jobs, executor, progress, store, resume, on_error, max_failed, retry_failed
         As in `evaluate`. With a store samples are made by rows, and memory does not grow with them.
     **options
         Options of the method; each stage gets its own.
@@ -166,7 +167,7 @@ def run(
         Results, as from `estimate`.
     """
     record, stages = check_arguments(inputs, method, n, of, options)
-    how = How(n_jobs, executor, progress, store, resume, on_error, max_failed)
+    how = How(n_jobs, executor, progress, store, resume, on_error, max_failed, retry_failed)
     (outcomes,) = completed(model, inputs, record, n, seed_of(rng), of=[of], stages=stages, how=how)
     return estimated(record, outcomes, inputs, of=of, **stages["estimate"])
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from hipuq import schema
 from hipuq.contact import ContactPatterns
 from hipuq.errors import InputError, SchemaError, unknown_name
-from hipuq.variation import HIGHEST, LOWEST, Input, Nominal, as_input
+from hipuq.uncertain import HIGHEST, LOWEST, Input, as_input
+from hipuq.variation import Nominal
 
 Array = NDArray[np.float64]
 

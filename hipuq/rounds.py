@@ -97,7 +97,9 @@ def completed(
             if how.store is None:
                 whole = together(whole, evaluated(model, own, wanted, how))
             else:
-                whole = evaluated(model, design, wanted, replace(how, resume=True, replace=False))
+                whole = evaluated(
+                    model, design, wanted, replace(how, resume=True, retry_failed=False, replace=False)
+                )
             places[k] = np.concatenate([_numbers(places[k]), np.arange(size, design.size)])
         if all(own is None for own in more):
             break

@@ -27,6 +27,7 @@ ORDER = [
     ["distributions"],
     ["contact"],
     ["variation"],
+    ["uncertain"],
     ["inputs"],
     ["sampling"],
     ["designs"],

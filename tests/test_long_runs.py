@@ -189,7 +189,7 @@ def test_options_of_the_command_are_checked(monkeypatch, capsys, tmp_path):
         (("--processes", "--dask", "tcp://127.0.0.1:1"), "--processes and --dask exclude each other"),
         (("--dask", "nowhere"), "there is no dask scheduler at 'nowhere'"),
     ):
-        monkeypatch.setattr("hipuq.cli.CONNECT", "1s")
+        monkeypatch.setattr("hipuq.cli.CONNECT", 1.0)
         code, _, err = command(monkeypatch, capsys, "run", folder, "--out", tmp_path / "out", *words)
         assert code == 1
         (line,) = err.strip().splitlines()

@@ -399,7 +399,7 @@ def test_a_full_disk_loses_nothing(whole, tmp_path):
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         message = pool.submit(limited, store).result()
     assert message.startswith(f"cannot write {store}: ")
-    assert message.endswith("what was complete stays: go on with resume")
+    assert message.endswith("what was complete stays: go on with resume=True, or --resume")
     same(hipuq.evaluate(Counting(), design(), store=store, resume=True), whole)
 
 

@@ -361,3 +361,48 @@ def test_a_saved_store_is_put_back_if_its_replacement_was_cut_off(tmp_path):
     hipuq.save_outcomes(second, store)
     assert hipuq.load_outcomes(store).sizes["sample"] == 10
     assert [path.name for path in tmp_path.iterdir()] == ["a.zarr"]
+
+
+def test_a_model_may_change_what_it_gets(tmp_path):
+    """As when it converts units in place; blocks, halving and stores change no number by that."""
+
+    def model(given: xr.Dataset) -> xr.Dataset:
+        if (given["x"] == 9).any():
+            raise ArithmeticError
+        given["x"].values *= 0.5
+        given["more"] = given["x"]
+        return xr.Dataset({"y": ("sample", given["x"].values * 2)})
+
+    mine = samples()
+    for block in (1, 7, 1024):
+        model.block = block
+        for store in (None, tmp_path / f"{block}.zarr"):
+            outcomes = hipuq.evaluate(model, mine, store=store)
+            known = outcomes["status"].values == 0
+            assert known.sum() == 39
+            assert np.array_equal(outcomes["y"].values[known], outcomes["x"].values[known])
+    xr.testing.assert_identical(mine, samples())
+
+
+def test_failed_samples_can_be_tried_again(tmp_path):
+    licensed = False
+    calls = []
+
+    def model(given: xr.Dataset) -> xr.Dataset:
+        calls.extend(given["x"].values.tolist())
+        if not licensed and (given["x"] > 33).any():
+            raise OSError("no licence")
+        return square(given)
+
+    model.block = 4
+    store = tmp_path / "a.zarr"
+    assert "failure_message" in hipuq.evaluate(model, samples(), store=store)
+    licensed = True
+    calls.clear()
+    assert "failure_message" in hipuq.evaluate(model, samples(), store=store, resume=True)
+    assert calls == []
+    outcomes = hipuq.evaluate(model, samples(), store=store, resume=True, retry_failed=True)
+    assert calls == list(range(32, 40))
+    same(outcomes, hipuq.evaluate(model, samples()))
+    with pytest.raises(hipuq.HipuqError, match="retry_failed needs resume"):
+        hipuq.evaluate(model, samples(), retry_failed=True)

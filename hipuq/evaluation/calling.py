@@ -221,8 +221,10 @@ def _is_verdict(name: str) -> bool:
 def _checked(call: Call, samples: xr.Dataset) -> xr.Dataset:
     """Return the model's outputs, checked, without coords over sample."""
     keep, size = call.keep, samples.sizes["sample"]
+    # A model may change what it gets, as when it converts units in place.
+    own = samples.copy(deep=True)
     everything = keep is None or not hasattr(call.model, "outcomes")
-    given = call.model(samples) if everything else call.model(samples, keep=keep)
+    given = call.model(own) if everything else call.model(own, keep=keep)
     if not isinstance(given, xr.Dataset):
         raise SchemaError(f"the model must return an xarray Dataset, not {type(given).__name__}")
     both = [str(name) for name in given.data_vars if name in samples.variables]
@@ -255,9 +257,9 @@ def _checked(call: Call, samples: xr.Dataset) -> xr.Dataset:
         always = [name for name in BOOKS if name in given and name not in keep]
         given = given[[*keep, *always]]
     made = outputs_of(given)
-    own = [name for name, values in given.coords.items() if "sample" in values.dims and name not in made]
-    if own:
-        given = given.drop_vars(own)
+    books = [name for name, values in given.coords.items() if "sample" in values.dims and name not in made]
+    if books:
+        given = given.drop_vars(books)
     whole_numbers = {name: _floating(values) for name, values in made.items() if _counts(name, values)}
     if whole_numbers:
         given = given.assign(whole_numbers)

@@ -46,6 +46,7 @@ def evaluate(
     resume: bool = False,
     on_error: str = MARK,
     max_failed: float = MAX_FAILED,
+    retry_failed: bool = False,
 ) -> xr.Dataset:
     """Evaluate a model on samples.
 
@@ -81,6 +82,8 @@ def evaluate(
     max_failed : float, default 0.5
         Share of the samples that may fail with an error or a wrong shape before the run ends; NaN is an
         answer, and as much of it as there is stays.
+    retry_failed : bool, default False
+        Whether, when a store is gone on with, its samples that failed are evaluated again.
 
     Returns
     -------
@@ -98,7 +101,7 @@ def evaluate(
     StoreError
         If the store cannot be written, holds something else, or another run writes to it.
     """
-    how = How(n_jobs, executor, progress, store, resume, on_error, max_failed)
+    how = How(n_jobs, executor, progress, store, resume, on_error, max_failed, retry_failed)
     return evaluated(model, samples, keep, how)
 
 
@@ -108,7 +111,7 @@ class How:
 
     Attributes
     ----------
-    n_jobs, executor, progress, store, resume, on_error, max_failed
+    n_jobs, executor, progress, store, resume, on_error, max_failed, retry_failed
         As in `evaluate`.
     replace : bool
         Whether a store that is there gives way to the new one, as soon as that has outcomes.
@@ -121,6 +124,7 @@ class How:
     resume: bool = False
     on_error: str = MARK
     max_failed: float = MAX_FAILED
+    retry_failed: bool = False
     replace: bool = False
 
     def __post_init__(self) -> None:
@@ -130,6 +134,8 @@ class How:
             raise InputError(f"max_failed is {share!r}: it must be a share of the samples from 0 to 1")
         if self.resume and self.store is None:
             raise InputError("resume needs a store: give the path of one, store=")
+        if self.retry_failed and not self.resume:
+            raise InputError("retry_failed needs resume: it is about the failures of an earlier run")
 
 
 def evaluated(model: Model, samples: xr.Dataset | Design, keep: Iterable[str] | None, how: How) -> xr.Dataset:
@@ -150,14 +156,14 @@ def evaluated(model: Model, samples: xr.Dataset | Design, keep: Iterable[str] | 
     design = as_design(samples)
     names = None if keep is None else _checked_names(model, keep)
     block = check_count("block of the model", getattr(model, "block", BLOCK))
-    if how.store is None and not design.given:
-        design = as_design(design.rows(0, design.size))
     checker = getattr(model, "check", None)
     if callable(checker):
         # What is wrong with a distribution shows in the first samples; a rare value fails by itself.
         checker(
             design.rows(0, design.size if design.given else min(design.size, units_of(design.size, block)))
         )
+    if how.store is None and not design.given:
+        design = as_design(design.rows(0, design.size))
     if how.executor == "processes":
         check_travels(model)
     run = _Run(model, design, names, min(block, units_of(design.size, block)), how)
@@ -197,6 +203,8 @@ class _Run:
         with opened(
             folder, self._definition(), variables, self.block, resume=how.resume, replace=how.replace
         ) as target:
+            if how.retry_failed:
+                target.forget_failed()
             try:
                 self._into(target)
             except KeyboardInterrupt:

@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 import time
 from collections import deque
@@ -171,11 +172,15 @@ def _cores(client: Any) -> Callable[[], int]:
 
 @contextmanager
 def _own(pool: Executor) -> Iterator[None]:
-    """Shut a pool down, and do not wait for what is queued when something went wrong."""
+    """Shut a pool down; what is queued is dropped, and after Ctrl-C what is running is not waited for."""
+    wait = True
     try:
         yield
+    except KeyboardInterrupt:
+        wait = False
+        raise
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        pool.shutdown(wait=wait, cancel_futures=True)
 
 
 def _processes(jobs: int) -> ProcessPoolExecutor:
@@ -187,6 +192,12 @@ def _processes(jobs: int) -> ProcessPoolExecutor:
 
 def check_travels(model: object) -> None:
     """Raise an InputError unless a model can be sent to another process."""
+    main = sys.modules.get("__main__")
+    if getattr(model, "__module__", "") == "__main__" and not hasattr(main, "__file__"):
+        raise InputError(
+            "the model is defined in a session, where another process does not find it: put it into a "
+            "module, or take executor='threads'"
+        )
     try:
         pickle.dumps(model)
     except Exception as error:

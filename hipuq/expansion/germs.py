@@ -12,7 +12,7 @@ from hipuq.errors import InputError
 from hipuq.expansion.polynomials import HIGHEST_DEGREE, orthonormal
 from hipuq.expansion.variable import Germ, germ_of
 from hipuq.inputs import Inputs
-from hipuq.variation import Input
+from hipuq.uncertain import Input
 
 Array = NDArray[np.float64]
 

@@ -1,18 +1,18 @@
 """Zarr stores as they are opened and written here.
 
-They are opened without what readers look at first, which is written last. Chunks are written without zarr's
-own machinery: it hands every one to another thread, which takes milliseconds where the interpreter is busy
-evaluating. Their format is fixed, and zarr reads them.
+Chunks are written without zarr's own machinery: it hands every one to another thread, which takes
+milliseconds where the interpreter is busy evaluating. Their format is fixed, and zarr reads them. Metadata
+are put together here too, since zarr warns of every file in a store that is not its own.
 """
 
 from __future__ import annotations
 
 import itertools
+import json
 import os
-import warnings
+import shutil
 import zlib
-from collections.abc import Hashable, Iterator
-from contextlib import contextmanager
+from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +22,13 @@ from numpy.typing import NDArray
 
 from hipuq.store.ledger import HALF, Files
 
+METADATA = ".zmetadata"
+"""File of all metadata together."""
+
 
 def open_arrays(folder: Path) -> xr.Dataset:
     """Return the arrays of a store; values are read when they are used."""
-    with quiet():
-        arrays: xr.Dataset = xr.open_zarr(folder, chunks=None, consolidated=False)
+    arrays: xr.Dataset = xr.open_zarr(folder, chunks=None, consolidated=True)
     return arrays.drop_encoding()
 
 
@@ -36,12 +38,37 @@ def outputs_of(given: xr.Dataset) -> dict[Hashable, xr.DataArray]:
     return {**given.data_vars, **named}
 
 
-@contextmanager
-def quiet() -> Iterator[None]:
-    """Let zarr list a store without a warning of each file that is not its own."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Object at")
-        yield
+def add_arrays(folder: Path, dataset: xr.Dataset, encoding: Mapping[Any, Any]) -> None:
+    """Write arrays to a store, in place of those of the same name; what else is there stays.
+
+    Parameters
+    ----------
+    folder : Path
+        The store; it need not be a group yet.
+    dataset : Dataset
+    encoding : mapping
+        As xarray takes it.
+    """
+    made = folder.with_name(f".{folder.name}.hipuq-made")
+    shutil.rmtree(made, ignore_errors=True)
+    # Version 2 of the format: version 3 has no settled strings yet.
+    dataset.to_zarr(made, mode="w", zarr_format=2, consolidated=False, encoding=encoding)
+    for path in made.iterdir():
+        target = folder / path.name
+        if path.is_dir() or not target.exists():
+            shutil.rmtree(target, ignore_errors=True)
+            path.rename(target)
+    shutil.rmtree(made)
+
+
+def write_metadata(folder: Path) -> None:
+    """Write what readers look at first: all metadata of a store together."""
+    places = [".zgroup", ".zattrs", *(f"*/{name}" for name in (".zarray", ".zattrs"))]
+    files = [file for place in places for file in sorted(folder.glob(place))]
+    metadata = {file.relative_to(folder).as_posix(): json.loads(file.read_bytes()) for file in files}
+    half = folder / f"{METADATA}{HALF}"
+    half.write_text(json.dumps({"metadata": metadata, "zarr_consolidated_format": 1}))
+    os.replace(half, folder / METADATA)
 
 
 def write_chunks(folder: Path, name: str, array: Any, values: NDArray[Any], axis: int, number: int) -> Files:

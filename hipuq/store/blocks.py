@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from hipuq.errors import StoreError
-from hipuq.store.arrays import open_arrays, outputs_of, quiet, write_chunks
+from hipuq.store.arrays import METADATA, add_arrays, open_arrays, outputs_of, write_chunks, write_metadata
 from hipuq.store.failures import FAILURES, MOST, failure_table
 from hipuq.store.guarding import check_array_name
 from hipuq.store.ledger import ABOUT, END, START, Files, Unit, add_unit, files_of
@@ -28,8 +28,8 @@ UNITS, STEPS, STEP = 64, 64, 1024
 ATTRS = "hipuq.attrs.json"
 """Attributes as xarray wrote them at first: the last ones replace them, and could be cut off."""
 
-ZATTRS, METADATA = ".zattrs", ".zmetadata"
-"""Attributes, and what readers look at first: all metadata together."""
+ZATTRS = ".zattrs"
+"""Attributes."""
 
 CHUNK_BYTES = 2**26
 """Largest chunk [byte], if it can be divided."""
@@ -96,6 +96,14 @@ class BlockStore:
     def seconds(self) -> float:
         """Time that its units took [s]."""
         return sum(unit.seconds for unit in self.units.values())
+
+    def forget_failed(self) -> None:
+        """Take units with failed samples for incomplete."""
+        failed = [number for number, unit in self.units.items() if unit.failed]
+        for number in failed:
+            del self.units[number]
+        if failed:
+            self.units.pop(END, None)
 
     def rows(self, number: int) -> slice:
         """Return the rows of a unit."""
@@ -204,22 +212,17 @@ class BlockStore:
         attrs : mapping
             Attributes of the outcomes.
         """
-        import zarr
-
         with self._writing():
             drop_table(self.folder)
             if failures := self.failures:
-                table = failure_table(failures)
-                with quiet():
-                    table.to_zarr(self.folder, mode="a", zarr_format=2, consolidated=False)
+                add_arrays(self.folder, failure_table(failures), {})
             whole = json.loads((self.folder / ATTRS).read_text()) | dict(attrs)
             (self.folder / ZATTRS).write_text(json.dumps(whole, indent=1, default=plain))
-            with quiet():
-                zarr.consolidate_metadata(str(self.folder), zarr_format=2)
             self._note(END)
 
     def _note(self, number: int) -> None:
         """Note in the ledger what was written beside the units: at first, or at the end."""
+        write_metadata(self.folder)
         arrays = [file for name in self._arrays for file in (f"{name}/.zarray", f"{name}/.zattrs")]
         if number == END:
             names = [ZATTRS, METADATA, *files_in(self.folder, FAILURES)]
@@ -255,20 +258,19 @@ class BlockStore:
             encoding[name] = {"chunks": chunks_of(outcomes[name], self.chunk)}
         empty = outcomes.drop_vars(self.labels.variables, errors="ignore").isel(sample=slice(0, 0))
         empty = empty.drop_attrs(deep=False).drop_encoding()
-        with quiet():
-            empty.to_zarr(self.folder, mode="a", zarr_format=2, consolidated=False, encoding=encoding)
+        add_arrays(self.folder, empty, encoding)
         group = _group(self.folder)
         for name in names:
             shape = [self.size if dim == "sample" else n for dim, n in outcomes[name].sizes.items()]
             group[name].resize(tuple(shape))
         if self.labels.variables:
-            with quiet():
-                self.labels.to_zarr(self.folder, mode="a", zarr_format=2, consolidated=False)
+            add_arrays(self.folder, self.labels, {})
         attrs = dict(group.attrs)
         # Where xarray looks for coordinates that no variable names.
         coordinates = [str(attrs.get("coordinates", "")), *map(str, self.labels.variables)]
         attrs["coordinates"] = " ".join(coordinates).strip()
-        (self.folder / ATTRS).write_text(json.dumps(attrs, default=plain))
+        for name in (ATTRS, ZATTRS):
+            (self.folder / name).write_text(json.dumps(attrs, default=plain))
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -276,7 +278,9 @@ class BlockStore:
             with reported("write", self.folder):
                 yield
         except StoreError as error:
-            raise StoreError(f"{error}; what was complete stays: go on with resume") from error
+            raise StoreError(
+                f"{error}; what was complete stays: go on with resume=True, or --resume"
+            ) from error
 
 
 def labels_of(samples: xr.Dataset) -> xr.Dataset:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -16,7 +16,7 @@ _guard = threading.Lock()
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def locked(folder: Path, shown: Path | None = None) -> Iterator[None]:
     """Hold the lock of a folder, which need not be there yet.
 
     A record lock of POSIX: a process forked from this one does not hold it, and the system takes it back
@@ -25,6 +25,8 @@ def locked(folder: Path) -> Iterator[None]:
     Parameters
     ----------
     folder : Path
+    shown : Path, optional
+        What errors name in its place.
 
     Raises
     ------
@@ -40,10 +42,10 @@ def locked(folder: Path) -> Iterator[None]:
     key = str(file.resolve())
     with _guard:
         if key in _held:
-            raise _busy(folder)
+            raise _busy(shown or folder)
         _held.add(key)
     try:
-        descriptor = _opened(file, folder, fcntl.lockf, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        descriptor = _opened(file, shown or folder, fcntl.lockf, fcntl.LOCK_EX | fcntl.LOCK_NB)
         try:
             yield
         finally:
@@ -56,9 +58,8 @@ def locked(folder: Path) -> Iterator[None]:
             _held.discard(key)
 
 
-def _opened(file: Path, folder: Path, lock: object, flags: int) -> int:
+def _opened(file: Path, folder: Path, lock: Callable[[int, int], None], flags: int) -> int:
     """Return the descriptor of a file that is locked and still has its name."""
-    assert callable(lock)
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         while True:

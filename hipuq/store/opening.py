@@ -11,8 +11,8 @@ from typing import Any
 
 from hipuq.differences import difference
 from hipuq.errors import StoreError
-from hipuq.store.arrays import open_arrays
-from hipuq.store.blocks import ATTRS, METADATA, ZATTRS, BlockStore, drop_table, plain, units_of
+from hipuq.store.arrays import open_arrays, write_metadata
+from hipuq.store.blocks import ATTRS, ZATTRS, BlockStore, drop_table, plain, units_of
 from hipuq.store.completeness import is_store, missing_in, size_of
 from hipuq.store.guarding import check_store
 from hipuq.store.ledger import (
@@ -206,13 +206,13 @@ def check_same(folder: Path, there: Mapping[str, Any], asked: Mapping[str, Any])
 def _whole(folder: Path) -> dict[int, Unit]:
     """Return the units of a store whose files are as they were written."""
     units = read_units(folder)
-    # All of these are written last: what is left of them says nothing of the units.
-    if not (END in units and as_they_were(folder, units[END].files, whole=True)):
-        drop_table(folder)
-        (folder / METADATA).unlink(missing_ok=True)
-        if (folder / ATTRS).is_file():
-            shutil.copyfile(folder / ATTRS, folder / ZATTRS)
     try:
+        # All of these are written last: what is left of them says nothing of the units.
+        if not (END in units and as_they_were(folder, units[END].files, whole=True)):
+            drop_table(folder)
+            if (folder / ATTRS).is_file():
+                shutil.copyfile(folder / ATTRS, folder / ZATTRS)
+            write_metadata(folder)
         if units:
             check_store(folder)
             arrays = open_arrays(folder)

@@ -21,6 +21,8 @@ from hipuq.models import CEAModel
 from hipuq.occurring import frequency_ranges, verdict_counts
 from hipuq.rounds import DEFAULT, completed, estimated
 from hipuq.store import load_outcomes
+from hipuq.store.completeness import progress_of
+from hipuq.store.ledger import ABOUT
 from hipuq.study.headline import DAMPING
 from hipuq.study.plan import Analysis
 from hipuq.study.tables import ReportTable
@@ -67,6 +69,9 @@ def analysed(
         too; where ``unstable`` is analysed ``<analysis>/frequencies``.
     """
     method, store = method_named(analysis.method), outcomes_of(analysis, folder)
+    if not how.resume and (store / ABOUT).is_file():
+        done, _ = progress_of(store)
+        say(f"{analysis.name}: {done:,} samples of an earlier run are replaced, --resume would keep them")
     found = completed(
         analysis.model,
         analysis.inputs,

@@ -17,7 +17,7 @@ from hipuq.errors import StoreError
 from hipuq.evidence import LITERATURE
 from hipuq.sampling import seed_of
 from hipuq.store import RESULTS_NAME, load_results
-from hipuq.store.completeness import progress_of
+from hipuq.store.completeness import missing_in, progress_of
 from hipuq.store.ledger import ABOUT
 from hipuq.study.analysing import Groups, outcomes_of
 from hipuq.study.file import COMPARE
@@ -26,6 +26,8 @@ from hipuq.study.problems import Problem
 
 DEFINITIONS = "analyses"
 """Root attribute of results: analysis -> what it was computed from, JSON."""
+
+REST = "run without --resume, or choose another folder with --out"
 
 AT_NOMINAL = ("friction_sweep", "mode_shapes")
 """Groups of an analysis that hold what the report shows at nominal values."""
@@ -101,7 +103,7 @@ class Earlier:
     dropped: dict[str, str] = field(default_factory=dict)
 
 
-def earlier(study: Study, folder: Path) -> Earlier:
+def earlier(study: Study, folder: Path, *, retry_failed: bool = False) -> Earlier:
     """Return what of an earlier run is kept; nothing is written.
 
     Parameters
@@ -109,6 +111,8 @@ def earlier(study: Study, folder: Path) -> Earlier:
     study : Study
     folder : Path
         Output folder.
+    retry_failed : bool
+        Whether analyses with failed samples are not kept.
 
     Returns
     -------
@@ -124,6 +128,8 @@ def earlier(study: Study, folder: Path) -> Earlier:
         return Earlier(runs=runs)
     tree = load_results(folder)
     analyses = _analyses(study, folder, tree)
+    if retry_failed:
+        analyses = {name: groups for name, groups in analyses.items() if not _failed(groups)}
     report = dict(zip(AT_NOMINAL, (study.report.friction_sweep, study.report.mode_shapes), strict=True))
     gone = [
         name
@@ -205,11 +211,24 @@ def _analyses(study: Study, folder: Path, tree: xr.DataTree) -> dict[str, Groups
             str(name): node.to_dataset(inherit=False).drop_encoding()
             for name, node in tree.children[one.name].children.items()
         }
+        if (seed := tree.attrs.get("seed")) is not None and str(seed) != str(study.seed):
+            raise StoreError(
+                f"analysis {one.name!r} in {folder} was made with seed {seed}, the study asks for "
+                f"{study.seed}: {REST}"
+            )
         same = _check_same(one.name, before, asked[one.name], folder)
-        if same and set(one.of) <= set(groups):
+        store = outcomes_of(one, folder)
+        # Outcomes that were damaged since are made again, and the results with them.
+        there = not (store / ABOUT).is_file() or not missing_in(store)
+        if same and there and set(one.of) <= set(groups):
             wanted = {*one.of, *kept}
             found[one.name] = {f"{one.name}/{key}": own for key, own in groups.items() if key in wanted}
     return found
+
+
+def _failed(groups: Groups) -> bool:
+    """Say whether samples of an analysis failed."""
+    return any(int(own["failed"].sum()) for own in groups.values() if "failed" in own)
 
 
 def _as_before(tree: xr.DataTree, study: Study) -> list[str]:
@@ -235,7 +254,6 @@ def _check_same(name: str, before: Any, asked: dict[str, Any], folder: Path) -> 
     StoreError
         If it is another one.
     """
-    rest = "run without --resume, or choose another folder with --out"
     there = before.get(name) if isinstance(before, dict) else None
     try:
         # Outcomes of fewer samples are taken over.
@@ -244,10 +262,10 @@ def _check_same(name: str, before: Any, asked: dict[str, Any], folder: Path) -> 
     except RecursionError:
         there = None
     if there is None:
-        raise StoreError(f"analysis {name!r} in {folder} does not say how it was made: {rest}")
+        raise StoreError(f"analysis {name!r} in {folder} does not say how it was made: {REST}")
     if found is not None:
         place, old, new = found
         raise StoreError(
-            f"analysis {name!r} in {folder} was made with {place} {old}, the study asks for {new}: {rest}"
+            f"analysis {name!r} in {folder} was made with {place} {old}, the study asks for {new}: {REST}"
         )
     return not fewer

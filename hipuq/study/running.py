@@ -14,7 +14,7 @@ from typing import Any
 import xarray as xr
 
 from hipuq import __version__
-from hipuq.errors import StoreError
+from hipuq.errors import InputError, StoreError
 from hipuq.evaluation import MAX_FAILED, How
 from hipuq.evidence import FIGURES, LITERATURE, literature
 from hipuq.models.oscillator_ring import OscillatorRing
@@ -35,6 +35,7 @@ def run_study(
     progress: bool | None = None,
     on_error: str = "mark",
     max_failed: float = MAX_FAILED,
+    retry_failed: bool = False,
     say: Callable[[str], None] = lambda line: None,
 ) -> xr.DataTree:
     """Run a study and write its outcomes and results.
@@ -49,7 +50,7 @@ def run_study(
         not, and single runs of comparisons are kept, so that the results are those of a run that was not
         cut off; an analysis with a larger n takes the outcomes that are there. Old results of a comparison
         stay in the file until it is complete again.
-    n_jobs, executor, progress, on_error, max_failed
+    n_jobs, executor, progress, on_error, max_failed, retry_failed
         As in `hipuq.evaluate`. Comparisons time their runs, so they take threads here whatever the executor.
     say : callable, optional
         Gets a line about each analysis, each budget of a comparison, and what the file no longer has.
@@ -72,16 +73,18 @@ def run_study(
     folder = Path(out)
     how = How(n_jobs, executor, progress, on_error=on_error, max_failed=max_failed)
     if resume:
-        how = replace(how, store=folder, resume=True)
+        how = replace(how, store=folder, resume=True, retry_failed=retry_failed)
+    elif retry_failed:
+        raise InputError("retry_failed needs resume: it is about the failures of an earlier run")
     _check_writable(folder)
     # The lock lies inside: the folder above need not be ours to write to.
-    with locked(folder / RUN):
+    with locked(folder / RUN, folder):
         return _run(study, folder, how, say)
 
 
 def _run(study: Study, folder: Path, how: How, say: Callable[[str], None]) -> xr.DataTree:
     resume, n_jobs, progress = how.resume, how.n_jobs, how.progress
-    before = earlier(study, folder) if resume else Earlier()
+    before = earlier(study, folder, retry_failed=how.retry_failed) if resume else Earlier()
     problems = [problem.rehearsed(n_jobs) for problem in study.problems]
     for name, why in before.dropped.items():
         say(f"{name}: dropped from {folder / RESULTS_NAME}, {why}")
