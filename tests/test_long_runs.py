@@ -156,6 +156,21 @@ def test_failures_are_told_and_too_many_end_the_command(monkeypatch, capsys, tmp
     assert f"{failed:,} failed" in said
 
 
+def test_results_that_were_cut_off_are_made_again(whole, tmp_path):
+    """As by a power cut: outcomes are there, so nothing is lost."""
+    run(tmp_path / "study")
+    file = tmp_path / "study" / "out" / "results.nc"
+    data = file.read_bytes()
+    file.write_bytes(data[: len(data) // 2])
+    said: list[str] = []
+    xr.testing.assert_identical(results(run(tmp_path / "study", resume=True, say=said.append)), whole)
+    assert "results.nc is cut off: it is now results.nc.damaged, and made again from the outcomes" in said[0]
+    file.write_text("not mine")
+    with pytest.raises(StoreError, match="cannot read"):
+        run(tmp_path / "study", resume=True)
+    assert file.read_text() == "not mine"
+
+
 def test_processes_give_the_same_bits(whole, tmp_path):
     xr.testing.assert_identical(results(run(tmp_path / "study", executor="processes", n_jobs=2)), whole)
 

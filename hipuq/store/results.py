@@ -40,7 +40,7 @@ def save_results(results: xr.DataTree | xr.Dataset, path: str | os.PathLike[str]
         # What is there may be a link to anything.
         part.unlink(missing_ok=True)
         tree.to_netcdf(part, engine="h5netcdf")
-        part.replace(file)
+        _put(part, file)
 
 
 def add_results(groups: Mapping[str, xr.Dataset], path: str | os.PathLike[str]) -> None:
@@ -66,7 +66,14 @@ def add_results(groups: Mapping[str, xr.Dataset], path: str | os.PathLike[str]) 
         shutil.copyfile(file, part)
         for name, dataset in groups.items():
             dataset.to_netcdf(part, mode="a", group=name, engine="h5netcdf")
-        part.replace(file)
+        _put(part, file)
+
+
+def _put(part: Path, file: Path) -> None:
+    """Give a file its name once the disk has all of it."""
+    with part.open("rb+") as stream:
+        os.fsync(stream.fileno())
+    part.replace(file)
 
 
 def load_results(path: str | os.PathLike[str]) -> xr.DataTree:

@@ -76,6 +76,10 @@ def run_study(
         how = replace(how, store=folder, resume=True, retry_failed=retry_failed)
     elif retry_failed:
         raise InputError("retry_failed needs resume: it is about the failures of an earlier run")
+    if resume and _is_cut_off(folder / RESULTS_NAME):
+        aside = folder / f"{RESULTS_NAME}.damaged"
+        (folder / RESULTS_NAME).replace(aside)
+        say(f"{folder / RESULTS_NAME} is cut off: it is now {aside.name}, and made again from the outcomes")
     _check_writable(folder)
     # The lock lies inside: the folder above need not be ours to write to.
     with locked(folder / RUN, folder):
@@ -123,6 +127,9 @@ def _run(study: Study, folder: Path, how: How, say: Callable[[str], None]) -> xr
         )
     return results.tree()
 
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""First bytes of a file of results."""
 
 RUN = "run"
 """What of an output folder one run at a time has."""
@@ -218,6 +225,20 @@ def _literature(study: Study) -> Groups:
 
 def _about(group: str, say: Callable[[str], None]) -> Callable[[str], None]:
     return lambda line: say(f"{group}: {line}")
+
+
+def _is_cut_off(file: Path) -> bool:
+    """Say whether a file begins as results do and cannot be read, as after a power cut."""
+    try:
+        with file.open("rb") as stream:
+            if stream.read(len(SIGNATURE)) != SIGNATURE:
+                return False
+        check_ours(file)
+    except StoreError as error:
+        return "truncated" in str(error)
+    except OSError:
+        return False
+    return False
 
 
 def _check_writable(folder: Path) -> None:
