@@ -86,6 +86,8 @@ def test_one_odd_sample_does_not_make_the_others_fail():
     outcomes = hipuq.evaluate(model, samples(50))
     assert np.flatnonzero(outcomes["status"].values == 2).tolist() == [7]
     assert "lengths (4,), not (3,)" in outcomes["failure_message"].values[0]
+    with pytest.raises(ModelError, match="1 of 50 samples failed, more than max_failed = 0 allows"):
+        hipuq.evaluate(model, samples(50), max_failed=0)
 
     def named(given: xr.Dataset) -> xr.Dataset:
         if (given["x"] == 7).any() and given.sizes["sample"] > 1:

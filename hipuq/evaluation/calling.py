@@ -123,14 +123,15 @@ class _Asked:
 
     def answer(self) -> Answer:
         self._try(slice(0, self.size))
-        lost, kind = len(self.failures), self.kind or ModelError
         if not self.pieces:
-            return Answer(None, self.failures, lost, kind)
+            return Answer(None, self.failures, len(self.failures), self.kind or ModelError)
         outputs = self.pieces[0][1]
         if len(self.pieces) > 1 or self.failures:
             outputs = self._alike().joined(self.pieces, self.size)
+        # From here on samples fail by NaN, which is an answer.
+        lost = len(self.failures)
         outputs = self._with_status(outputs)
-        return Answer(outputs, dict(sorted(self.failures.items())), lost, kind)
+        return Answer(outputs, dict(sorted(self.failures.items())), lost, self.kind or ModelError)
 
     def _alike(self) -> Layout:
         """Return the layout of all pieces; those that differ from the largest one are tried again for it."""
