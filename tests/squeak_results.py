@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 import hipuq
+from hipuq.evaluation import How
 from hipuq.methods import METHODS
 from hipuq.occurring import frequency_ranges, verdict_counts
 from hipuq.rounds import completed
@@ -38,9 +39,9 @@ def swept():
     stages = METHODS["monte_carlo"].split({"stratify": "contact"})
     parts = {"any_unstable": [], "unstable": [], "frequencies": [], "verdicts": []}
     for ratio in RATIOS:
-        outcomes = completed(
+        (outcomes,) = completed(
             model, inputs, METHODS["monte_carlo"], 6, 1, of=["any_unstable", "unstable"], stages=stages,
-            fixed={"damping_ratio": ratio}, keep=["frequency"], progress=False,
+            at=[{"damping_ratio": ratio}], keep=["frequency"], how=How(progress=False),
         )  # fmt: skip
         for of in ("any_unstable", "unstable"):
             parts[of].append(hipuq.estimate("monte_carlo", outcomes, inputs, of=of))
