@@ -13,6 +13,7 @@ import hipuq
 from hipuq import schema
 from hipuq.errors import InputError, ModelError, SchemaError, UnknownNameError
 from hipuq.evaluation import evaluating
+from hipuq.models import CEAModel
 
 SIZE = 2500  # more than two blocks
 
@@ -54,8 +55,17 @@ def test_processes_do_not_change_a_bit(study):
 @pytest.mark.parametrize("block", [7, 100, 5000])
 def test_blocks_do_not_change_a_bit(study, block, monkeypatch):
     model, samples, expected = study
-    monkeypatch.setattr(evaluating, "BLOCK", block)
+    seen, whole = [], CEAModel.__call__
+
+    def call(self, given, keep=None):
+        seen.append(given.sizes["sample"])
+        return whole(self, given, keep)
+
+    monkeypatch.setattr(CEAModel, "block", block)
+    monkeypatch.setattr(CEAModel, "__call__", call)
     assert hipuq.evaluate(model, samples, n_jobs=2).equals(expected)
+    # Models of ours take more at a time than this, but few samples are divided for all cores.
+    assert max(seen) == min(block, 1024)
 
 
 def test_outcomes_hold_samples_outputs_and_status(study):
