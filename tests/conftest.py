@@ -15,7 +15,5 @@ settings.load_profile("hipuq")
 
 
 def pytest_collection_finish(session):
-    """Have the garbage collector leave alone what all tests share, and come less often: it is dear."""
-    gc.collect()
-    gc.freeze()
+    """Have the garbage collector come less often: it is dear where so much is loaded."""
     gc.set_threshold(100_000)

@@ -230,7 +230,7 @@ def test_control_c_leaves_a_store_that_goes_on(tmp_path):
     arguments = ["run", str(folder), "--out", str(tmp_path / "out"), "--processes", "--jobs", "1"]
     store = tmp_path / "out" / "outcomes" / "draws.zarr"
     with subprocess.Popen(
-        [sys.executable, "-m", "hipuq", *arguments],
+        [sys.executable, "-W", "ignore", "-m", "hipuq", *arguments],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

@@ -29,7 +29,11 @@ METADATA = ".zmetadata"
 def open_arrays(folder: Path) -> xr.Dataset:
     """Return the arrays of a store; values are read when they are used."""
     arrays: xr.Dataset = xr.open_zarr(folder, chunks=None, consolidated=True)
-    return arrays.drop_encoding()
+    # Not drop_encoding: older releases of xarray read all values for it.
+    for values in arrays.variables.values():
+        values.encoding = {}
+    arrays.encoding = {}
+    return arrays
 
 
 def outputs_of(given: xr.Dataset) -> dict[Hashable, xr.DataArray]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import xarray as xr
 
 from hipuq.errors import StoreError
+from hipuq.store.arrays import open_arrays
 from hipuq.store.completeness import is_store, missing_in
 from hipuq.store.guarding import check_store
 from hipuq.store.ledger import ABOUT
@@ -78,8 +79,7 @@ def load_outcomes(path: str | os.PathLike[str]) -> xr.Dataset:
             raise StoreError(f"cannot read {folder}: {missing}; evaluate again with resume=True")
     with reported("read", folder):
         check_store(folder)
-        outcomes = xr.open_zarr(folder, chunks=None, consolidated=True)
+        outcomes = open_arrays(folder)
     if "hipuq_version" not in outcomes.attrs:
         raise StoreError(f"{folder} is not a store of hipuq: it has no attribute hipuq_version")
-    found: xr.Dataset = outcomes.drop_encoding()
-    return found
+    return outcomes
