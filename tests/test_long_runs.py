@@ -230,7 +230,7 @@ def test_control_c_leaves_a_store_that_goes_on(tmp_path):
     arguments = ["run", str(folder), "--out", str(tmp_path / "out"), "--processes", "--jobs", "1"]
     store = tmp_path / "out" / "outcomes" / "draws.zarr"
     with subprocess.Popen(
-        [sys.executable, "-W", "ignore", "-m", "hipuq", *arguments],
+        [sys.executable, "-m", "hipuq", *arguments],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -241,6 +241,8 @@ def test_control_c_leaves_a_store_that_goes_on(tmp_path):
         os.killpg(process.pid, signal.SIGINT)
         _, err = process.communicate()
     assert process.returncode == 130
-    assert err.startswith("hipuq: interrupted: ")
-    assert err.endswith(f" of 3,000,000 samples are in {store}; go on with --resume\n")
-    assert err.count("\n") == 1
+    # Old releases of libraries warn while they are imported.
+    (line,) = (line for line in err.splitlines() if "Warning" not in line and not line.startswith("  "))
+    assert line.startswith("hipuq: interrupted: ")
+    assert line.endswith(f" of 3,000,000 samples are in {store}; go on with --resume")
+    assert "Traceback" not in err
