@@ -260,10 +260,11 @@ def assumptions(reading: Reading) -> list[str]:
         lines.append(f"{given} an assumption{more}")
     if "trusted" in results and not bool((results["trusted"] != 0).all()):
         lines.append("The surrogate behind it is not to be trusted, so its interval is wide, or wrong")
-    if undecided := int(results["undecided"]) + int(results["failed"]):
+    undecided, failed = int(results["undecided"]), int(results["failed"])
+    if undecided or failed:
         lines.append(
-            f"{undecided:,} of {int(results['evaluations']):,} evaluations have no verdict: they count as "
-            "stable in "
-            "the lower limit and as unstable in the upper one"
+            f"{undecided + failed:,} of {int(results['evaluations']):,} evaluations have no verdict "
+            f"({undecided:,} undecided, {failed:,} failed): they count as stable in the lower limit and as "
+            "unstable in the upper one"
         )
     return lines
