@@ -142,5 +142,6 @@ def test_registries_agree_with_their_folders():
         "onset",
         "parameter",
         "sensitivity",
+        "shapes",
         "__init__",
     } == modules

@@ -15,6 +15,7 @@ import chaospy as cp
 import numpy as np
 import pytest
 import xarray as xr
+from same_outcomes import same
 
 import hipuq
 from hipuq.designs import Design
@@ -45,18 +46,6 @@ class Counting:
             raise KeyboardInterrupt
         self.seen += samples.sizes["sample"]
         return RING(samples, keep)
-
-
-def plain(outcomes: xr.Dataset) -> xr.Dataset:
-    """Return outcomes in memory, without what differs from run to run."""
-    found = outcomes.load().copy()
-    for key in ("history", "seconds"):
-        found.attrs.pop(key)
-    return found
-
-
-def same(one: xr.Dataset, other: xr.Dataset) -> None:
-    xr.testing.assert_identical(plain(one), plain(other))
 
 
 def design(n: int = 200, **options: object) -> Design:

@@ -9,6 +9,7 @@ import chaospy as cp
 import numpy as np
 import pytest
 import xarray as xr
+from same_outcomes import plain, same
 
 import hipuq
 from hipuq import schema
@@ -28,17 +29,6 @@ def square(given: xr.Dataset) -> xr.Dataset:
 
 
 square.block = 4
-
-
-def plain(outcomes: xr.Dataset) -> xr.Dataset:
-    found = outcomes.load().copy()
-    for key in ("history", "seconds"):
-        found.attrs.pop(key)
-    return found
-
-
-def same(one: xr.Dataset, other: xr.Dataset) -> None:
-    xr.testing.assert_identical(plain(one), plain(other))
 
 
 def forget(store: Path, kept: int) -> None:

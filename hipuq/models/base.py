@@ -15,6 +15,7 @@ from hipuq.cea import ALWAYS, AUTO, NEVER, Pencils, Spectra, mode_shapes, solve
 from hipuq.errors import InputError, SchemaError, check_name, unknown_name
 from hipuq.inputs import Inputs
 from hipuq.models.parameter import Parameter
+from hipuq.models.shapes import labelled_shapes
 from hipuq.variation import Nominal
 
 Array = NDArray[np.float64]
@@ -325,25 +326,7 @@ class CEAModel(ABC):
             1 kg m^2 with the largest entry real and positive; ``frequency``, ``growth_rate``,
             ``strain_energy``, ``kinetic_energy``, ``friction_work``, ``damping_work`` over mode.
         """
-        shapes = mode_shapes(self.pencils(sample))
-        energy = {
-            "strain_energy": "mean strain energy over a cycle",
-            "kinetic_energy": "mean kinetic energy over a cycle",
-            "friction_work": "work of friction in a cycle",
-            "damping_work": "work of damping in a cycle",
-        }
-        shape_attrs = {"units": "m", "normalization": "modal mass 1 kg m^2, largest entry real"}
-        data: dict[str, Any] = {
-            "frequency": ("mode", shapes.eigenvalue.imag / (2 * np.pi), schema.OUTCOMES["frequency"].attrs),
-            "growth_rate": ("mode", shapes.eigenvalue.real, schema.OUTCOMES["growth_rate"].attrs),
-        }
-        for part in ("real", "imag"):
-            attrs = {"long_name": f"mode shape, {part} part", **shape_attrs}
-            data[f"shape_{part}"] = (("mode", "dof"), getattr(shapes.shape, part), attrs)
-        for name, long_name in energy.items():
-            data[name] = ("mode", getattr(shapes, name), {"long_name": long_name, "units": "J"})
-        dof = ("dof", np.arange(1, self.dofs + 1), {"long_name": "degree of freedom", "units": "1"})
-        found = xr.Dataset(data, coords={**self.mode_coordinates(), "dof": dof})
+        found = labelled_shapes(mode_shapes(self.pencils(sample)), self.mode_coordinates())
         options = {"model": self.options}
         return schema.stamp(found, "mode shapes", model=self.label, options=options, like=sample.attrs)
 
