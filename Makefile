@@ -1,5 +1,6 @@
 # Everything runs in a virtual environment that make sets up itself: it takes Python 3.11 or later
-# with venv, and pip's package index. Only `make lock` needs uv, and installs it.
+# with venv, and pip's package index. Only `make lock` needs uv, and installs it. A C compiler is used
+# where there is one; where not, the installation takes one from the index for itself: hatch_build.py.
 
 PYTHON ?= python3
 VENV   ?= .venv
@@ -15,9 +16,14 @@ RUNTIME = $(VENV)/.installed
 DEV = $(VENV)/.installed-dev
 LOWEST_DEV = $(LOWEST)/.installed-dev
 
+# The kernel is compiled by the installation, into the source tree.
+COMPILED = hatch_build.py $(wildcard hipuq/compiled/*.[ch])
+CHECK_KERNEL = ls hipuq/compiled/_kernel.* >/dev/null 2>&1 || \
+	echo "hipuq: no compiled kernel, LAPACK takes its place, slower; pip install -v -e . says why"
+
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help study test test-lowest lint types lock clean
+.PHONY: help study test test-lowest bench lint types lock clean
 
 help:  ## List the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## /\1 /p' Makefile | while read -r name what; \
@@ -33,6 +39,9 @@ test: $(DEV)  ## Run the tests; ARGS go to pytest
 test-lowest: $(LOWEST_DEV)  ## Run the tests with the lowest versions that pyproject.toml allows
 	$(LOWEST)/bin/python -m pytest -n auto -W "ignore::DeprecationWarning" \
 		-W "ignore::PendingDeprecationWarning" $(ARGS)
+
+bench: $(DEV)  ## Measure speed against NumPy, chaospy and SALib, see docs/speed.md; ARGS go to pytest
+	$(BIN)/python -m pytest -c tests/benchmarks/pytest.ini tests/benchmarks $(ARGS)
 
 lint: $(DEV)  ## Check the format and the rules of the code
 	$(BIN)/ruff format --check .
@@ -52,21 +61,25 @@ COMPILE = pip compile --quiet --universal --python-version 3.11 --upgrade --no-a
 
 clean:  ## Remove the environments, caches and builds; results stay
 	rm -rf "$(VENV)" "$(LOWEST)" build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -f hipuq/compiled/_kernel.*
 	find hipuq tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
-$(RUNTIME): pyproject.toml constraints.txt | $(BIN)/pip
+$(RUNTIME): pyproject.toml constraints.txt $(COMPILED) | $(BIN)/pip
 	@echo "Installing hipuq into $(VENV)"
 	@$(BIN)/python $(PIP) install -c constraints.txt -e .
+	@$(CHECK_KERNEL)
 	@touch $@
 
-$(DEV): pyproject.toml constraints.txt | $(BIN)/pip
+$(DEV): pyproject.toml constraints.txt $(COMPILED) | $(BIN)/pip
 	@echo "Installing hipuq and what its tests need into $(VENV)"
 	@$(BIN)/python $(PIP) install -c constraints.txt -e ".[dev]"
+	@$(CHECK_KERNEL)
 	@touch $(RUNTIME) $@
 
-$(LOWEST_DEV): pyproject.toml constraints-lowest.txt | $(LOWEST)/bin/pip
+$(LOWEST_DEV): pyproject.toml constraints-lowest.txt $(COMPILED) | $(LOWEST)/bin/pip
 	@echo "Installing hipuq, what its tests need, and dask, lowest versions, into $(LOWEST)"
 	@$(LOWEST)/bin/python $(PIP) install -c constraints-lowest.txt -e ".[dev,dask]"
+	@$(CHECK_KERNEL)
 	@touch $@
 
 # pip comes last, so an environment without it is not complete.

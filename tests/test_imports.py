@@ -32,6 +32,7 @@ ORDER = [
     ["sampling"],
     ["designs"],
     ["expansion"],
+    ["compiled"],
     ["cea"],
     ["models"],
     ["store"],
@@ -124,7 +125,9 @@ def test_who_imports_what(path):
     if top(path) == "cea":
         assert not heads & {"xarray", "chaospy"}
         assert all(
-            name.startswith(("hipuq.cea", "hipuq.errors")) for name in names if name.startswith("hipuq")
+            name.startswith(("hipuq.cea", "hipuq.compiled", "hipuq.errors"))
+            for name in names
+            if name.startswith("hipuq")
         )
     if top(path) not in ("plots", "report"):
         assert "matplotlib" not in heads

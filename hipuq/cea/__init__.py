@@ -5,14 +5,19 @@ eq. 1). Frequency is ``Im l / (2 pi)``, growth rate ``Re l``, damping ratio ``-R
 """
 
 from hipuq.cea.bounds import ALWAYS, AUTO, NEVER
+from hipuq.cea.compact import CompactPencils
+from hipuq.cea.entries import Entries
 from hipuq.cea.modes import ModeShapes, mode_shapes
 from hipuq.cea.pencils import Pencils
-from hipuq.cea.spectrum import Spectra, damping_ratio, solve
+from hipuq.cea.spectra import Spectra
+from hipuq.cea.spectrum import damping_ratio, solve
 
 __all__ = [
     "ALWAYS",
     "AUTO",
     "NEVER",
+    "CompactPencils",
+    "Entries",
     "ModeShapes",
     "Pencils",
     "Spectra",

@@ -12,12 +12,12 @@ from hipuq.cea.bounds import (
     DOUBLE,
     EPS,
     NEVER,
-    Complex,
     conditioned_eigenvalues,
     norms,
     scales,
 )
 from hipuq.cea.certificate import certify_damped
+from hipuq.cea.eigenvalues import eigenvalues
 from hipuq.cea.numbering import TIE, mode_order
 from hipuq.cea.pencils import Array
 
@@ -95,7 +95,7 @@ def _state_space_modes(
     states[:, :n, n:] = np.eye(n)
     states[:, n:, :n] = -stiffness / np.square(rate)[:, None, None]
     states[:, n:, n:] = -damping / rate[:, None, None]
-    values: Complex = np.linalg.eigvals(states).astype(np.complex128)
+    values = eigenvalues(states)
     uniform = filter_radius * norms(states)[:, None] if filter_radius else np.inf
     radius = np.broadcast_to(uniform, values.shape)
     limit = (threshold / rate)[:, None]

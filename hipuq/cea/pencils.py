@@ -86,6 +86,13 @@ class Pencils:
             raise InputError(f"mechanisms must lie between 0 and {n - 1}, they are {self.mechanisms}")
 
     @property
+    def damped(self) -> NDArray[np.bool_]:
+        """Whether a sample has any damping, (s,)."""
+        if self.damping is None:
+            return np.zeros(len(self.friction), np.bool_)
+        return np.asarray(self.damping.any(axis=(1, 2)), np.bool_)
+
+    @property
     def total_stiffness(self) -> Array:
         """K = K0 + mu K1, (s, n, n) [N/m]."""
         total: Array = self.friction_stiffness * self.friction[:, None, None]

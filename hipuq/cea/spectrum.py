@@ -9,75 +9,30 @@ unstable; a structured solver or a certificate may decide it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hipuq.cea.bounds import ALWAYS, AUTO, NEVER
+from hipuq.cea.compact import CompactPencils
 from hipuq.cea.damped import damped_modes
+from hipuq.cea.lanes import lane_modes
 from hipuq.cea.pencils import Array, Pencils
+from hipuq.cea.spectra import Spectra
 from hipuq.cea.undamped import undamped_modes
+from hipuq.compiled.library import kernel
 from hipuq.errors import InputError, check_name
 
 
-@dataclass(frozen=True)
-class Spectra:
-    """Spectra of a batch of s samples with n modes by ascending frequency.
-
-    Inside a coalesced pair the decaying eigenvalue comes first and the growing one second.
-    Mechanisms come first of all, with frequency, growth rate and verdict 0.
-
-    Attributes
-    ----------
-    frequency : (s, n) array
-        Im l / (2 pi) [Hz].
-    growth_rate : (s, n) array
-        Re l [1/s].
-    unstable : (s, n) array of float32
-        1 if the growth rate is above the threshold, 0 if not, NaN if that is not known.
-    margin : (s,) array
-        Stability margin [1], negative exactly where unstable, NaN where that is unknown. Undamped
-        and without a threshold it is the smallest of: the squared gap of neighbouring real
-        eigenvalues w = -l**2, minus the squared gap of each complex pair (both over the squared
-        mean of w), and the smallest real w over that mean. Otherwise it is
-        (threshold - largest growth rate) / root mean w.
-    mechanisms : (s,) array of int
-        Number of rigid mechanisms: those that the model declares, or more if more were found.
-    decided_by : (s,) array of int8
-        `DOUBLE`, `STRUCTURED` or `CERTIFICATE` of `hipuq.cea.bounds`; -1 where nothing decided.
-    """
-
-    frequency: Array
-    growth_rate: Array
-    unstable: NDArray[np.float32]
-    margin: Array
-    mechanisms: NDArray[np.intp]
-    decided_by: NDArray[np.int8]
-
-    @property
-    def any_unstable(self) -> NDArray[np.float32]:
-        """1 if a mode is known to be unstable, 0 if all are known to be stable, else NaN; (s,)."""
-        unknown = np.isnan(self.unstable).any(axis=1)
-        verdict = np.where(unknown, np.nan, 0.0)
-        verdict[(self.unstable == 1).any(axis=1)] = 1.0
-        return verdict.astype(np.float32)
-
-    @property
-    def unstable_count(self) -> NDArray[np.float32]:
-        """Number of unstable modes, NaN if any mode is unknown; (s,)."""
-        count: NDArray[np.float32] = self.unstable.sum(axis=1, dtype=np.float32)
-        return count
-
-
-def solve(pencils: Pencils, *, growth_threshold: float = 0.0, certify: str = AUTO) -> Spectra:
+def solve(
+    pencils: Pencils | CompactPencils, *, growth_threshold: float = 0.0, certify: str = AUTO
+) -> Spectra:
     """Solve a batch of eigenvalue problems and judge their stability.
 
     Each sample is solved by itself, so results do not depend on the batch that it is in.
 
     Parameters
     ----------
-    pencils : Pencils
+    pencils : Pencils or CompactPencils
         The matrices of s samples.
     growth_threshold : float, default 0
         Growth rate above which a mode counts as unstable [1/s], not negative.
@@ -101,27 +56,58 @@ def solve(pencils: Pencils, *, growth_threshold: float = 0.0, certify: str = AUT
             f"growth_threshold is {growth_threshold}: it must be a finite number of 1/s, 0 or above"
         )
     check_name("way to certify", certify, (AUTO, ALWAYS, NEVER))
+    judged = None if certify == ALWAYS else _by_lanes(pencils, growth_threshold)
+    if judged is None:
+        whole = pencils if isinstance(pencils, Pencils) else pencils.rows()
+        return _by_bounds(whole, growth_threshold, certify, whole.filter_radius)
+    spectra, rest = judged
+    if rest.size:
+        spectra.put(rest, _by_bounds(pencils.rows(rest), growth_threshold, certify, 0.0))
+    return spectra
+
+
+def _by_lanes(pencils: Pencils | CompactPencils, threshold: float) -> tuple[Spectra, NDArray[np.intp]] | None:
+    """Let the compiled kernel judge what it can; return that and the samples that it leaves open."""
+    compiled = kernel()
+    if compiled is None or not pencils.filter_radius:
+        return None
+    if isinstance(pencils, CompactPencils):
+        spectra, open_ = lane_modes(compiled, pencils, threshold)
+        return spectra, np.flatnonzero(open_)
+    damped = pencils.damped
+    free = np.flatnonzero(~damped)
+    part, open_ = lane_modes(compiled, CompactPencils.of(pencils.rows(free)), threshold)
+    spectra = Spectra.empty(*pencils.stiffness.shape[:2])
+    spectra.put(free, part)
+    return spectra, np.concatenate([np.flatnonzero(damped), free[open_]])
+
+
+def _by_bounds(pencils: Pencils, threshold: float, certify: str, filter_radius: float) -> Spectra:
+    """Judge every sample by eigenvalues and bounds of their errors, and by what lies behind them.
+
+    `filter_radius` is that of the undamped samples, 0 where it did not clear them.
+    """
     stiffness, damping = pencils.reduced()
     mechanisms = pencils.mechanisms
     s, n = stiffness.shape[:2]
     frequency, growth, known = np.empty((s, n)), np.empty((s, n)), np.empty((s, n), bool)
     margin, decided_by = np.empty(s), np.empty(s, np.int8)
-    damped = np.zeros(s, bool) if damping is None else damping.any(axis=(1, 2))
+    damped = pencils.damped
     free = ~damped
     if free.any():
         frequency[free], growth[free], known[free], margin[free], decided_by[free] = undamped_modes(
-            stiffness[free], mechanisms[free], growth_threshold, certify, pencils.filter_radius
+            stiffness[free], mechanisms[free], threshold, certify, filter_radius
         )
     if damping is not None and damped.any():
         frequency[damped], growth[damped], known[damped], margin[damped], decided_by[damped] = damped_modes(
             stiffness[damped],
             damping[damped],
             mechanisms[damped],
-            growth_threshold,
+            threshold,
             certify,
             pencils.filter_radius,
         )
-    unstable = np.where(known, growth > growth_threshold, np.nan).astype(np.float32)
+    unstable = np.where(known, growth > threshold, np.nan).astype(np.float32)
     # The certificate may find more zero roots than were declared: they are mechanisms too.
     found = (known & (frequency == 0) & (growth == 0)).sum(axis=1)
     spectra = Spectra(frequency, growth, unstable, margin, np.maximum(mechanisms, found), decided_by)

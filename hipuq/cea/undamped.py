@@ -28,6 +28,7 @@ from hipuq.cea.bounds import (
     scales,
 )
 from hipuq.cea.certificate import certify_damped, certify_undamped
+from hipuq.cea.eigenvalues import eigenvalues
 from hipuq.cea.numbering import mode_order
 from hipuq.cea.pencils import Array
 from hipuq.cea.structured import block_sizes, conjugate_pairs, structured_eigenvalues
@@ -55,7 +56,7 @@ def undamped_modes(
     certify : str
         ``"auto"``, ``"always"`` or ``"never"``.
     filter_radius : float
-        As in `Pencils`.
+        As in `Pencils`; 0 for samples that it is known not to clear.
 
     Returns
     -------
@@ -116,14 +117,18 @@ def judged_roots(
     stiffness: Array, mechanisms: NDArray[np.intp], threshold: float, certify: str, filter_radius: float
 ) -> Roots:
     """Return the roots w, which of them are mechanisms, of which the verdict is known, and by which path."""
-    values: Complex = np.linalg.eigvals(stiffness).astype(np.complex128)
+    s, n = stiffness.shape[:2]
     norm = norms(stiffness)[:, None]
-    uniform = np.broadcast_to(filter_radius * norm if filter_radius else np.inf, values.shape)
-    rigid, known = judge(values, uniform, ZERO * norm, mechanisms, threshold)
-    roots = Roots(values, rigid, known, np.full(len(values), DOUBLE, np.int8))
+    no = np.zeros((s, n), np.bool_)
+    roots = Roots(np.empty((s, n), np.complex128), no, no.copy(), np.full(s, DOUBLE, np.int8))
     if certify == ALWAYS:
-        _certify(roots, np.arange(len(values)), stiffness, mechanisms, threshold)
+        roots.values[:] = eigenvalues(stiffness)
+        _certify(roots, np.arange(s), stiffness, mechanisms, threshold)
         return roots
+    if filter_radius:
+        roots.values[:] = eigenvalues(stiffness)
+        uniform = np.broadcast_to(filter_radius * norm, (s, n))
+        roots.rigid[:], roots.known[:] = judge(roots.values, uniform, ZERO * norm, mechanisms, threshold)
     rows = roots.open()
     if rows.size:
         part = stiffness[rows]
@@ -134,10 +139,9 @@ def judged_roots(
             values[symmetric] = np.linalg.eigvalsh(part[symmetric])
             radius[symmetric] = SAFETY * EPS * norm[rows[symmetric]]
         zero = np.maximum(ZERO * norm[rows], radius)
-        judged = judge(values, radius, zero, mechanisms[rows], threshold, symmetric[:, None])
-        # From here on these eigenvalues stand, known or not: they go with their bounds.
-        roots.known[rows] = False
-        roots.take(rows, values, judged, DOUBLE)
+        rigid, known = judge(values, radius, zero, mechanisms[rows], threshold, symmetric[:, None])
+        # These eigenvalues stand, known or not: they go with their bounds.
+        roots.values[rows], roots.rigid[rows], roots.known[rows] = values, rigid, known
     rows = roots.open()
     if rows.size and certify != NEVER:
         sizes = block_sizes(stiffness[rows])

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from hipuq import schema
-from hipuq.cea import ALWAYS, AUTO, NEVER, Pencils, Spectra, mode_shapes, solve
+from hipuq.cea import ALWAYS, AUTO, NEVER, CompactPencils, Pencils, Spectra, mode_shapes, solve
 from hipuq.errors import InputError, SchemaError, check_name, unknown_name
 from hipuq.inputs import Inputs
 from hipuq.models.parameter import Parameter
@@ -97,6 +97,24 @@ class CEAModel(ABC):
         -------
         Pencils
         """
+
+    def compact(self, values: Mapping[str, Array]) -> CompactPencils | None:
+        """Return the matrices of a batch by their entries, as the compiled kernel takes them.
+
+        A model may give them beside `assemble`, which every model has; they must be the same to the
+        last bit.
+
+        Parameters
+        ----------
+        values : mapping
+            As `assemble`.
+
+        Returns
+        -------
+        CompactPencils or None
+            None, as here, where the model does not give them for these values.
+        """
+        return None
 
     @property
     def label(self) -> str:
@@ -273,7 +291,9 @@ class CEAModel(ABC):
         Dataset
             Over ``sample`` and ``mode``.
         """
-        spectra = solve(self.pencils(samples), growth_threshold=self.growth_threshold, certify=self.certify)
+        values = self.values(samples)
+        pencils = self.compact(values) or self.assemble(values)
+        spectra = solve(pencils, growth_threshold=self.growth_threshold, certify=self.certify)
         return self._outcomes(spectra, self.outcomes if keep is None else tuple(keep))
 
     def _outcomes(self, spectra: Spectra, keep: tuple[str, ...]) -> xr.Dataset:

@@ -17,9 +17,9 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import cosdg, sindg
 
 from hipuq.cea import Pencils
+from hipuq.compiled.angles import cosine_and_sine
 from hipuq.errors import InputError, check_name
 from hipuq.models.base import LINEAR, CEAModel
 from hipuq.models.parameter import Parameter
@@ -78,7 +78,7 @@ class Hoffmann(CEAModel):
         size = len(values["k1"])
         stiffness = np.zeros((size, 2, 2))
         for k, angle in ((values["k1"], values["angle_1"]), (values["k2"], values["angle_2"])):
-            c, s = cosdg(angle), sindg(angle)
+            c, s = cosine_and_sine(angle)
             stiffness[:, 0, 0] += k * c * c
             stiffness[:, 1, 1] += k * s * s
             stiffness[:, 0, 1] += k * s * c

@@ -12,16 +12,18 @@ four entries of equation 7 are mu kc t n^T, because cos^2 b + sin^2 b = 1.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import cosdg, sindg
 
 from hipuq import schema
-from hipuq.cea import Pencils
+from hipuq.cea import CompactPencils, Entries, Pencils
+from hipuq.cea.entries import rows_apart
+from hipuq.compiled.angles import cosine_and_sine
 from hipuq.errors import InputError, check_name
 from hipuq.models.base import LINEAR, CEAModel
 from hipuq.models.parameter import Parameter
@@ -52,6 +54,9 @@ rings of up to nine oscillators judged by exact arithmetic (nominal, scattered, 
 
 FILTER_OSCILLATORS = 9
 """Largest ring for which the filter is validated with that margin."""
+
+DAMPING = ("damping_ratio", "mass_damping", "stiffness_damping")
+"""Parameters that make a sample damped where they are not zero."""
 
 LIMITS = (
     "The ring is a planar model of a mechanism, the coupling of modes by friction: it is not the model of "
@@ -136,7 +141,7 @@ class OscillatorRing(CEAModel):
             )
         has_angle = "contact_angle" in sample
         angle = sample["contact_angle"].values[0] if has_angle else self.parameters["contact_angle"].nominal
-        position = np.stack([cosdg(angle), sindg(angle)], axis=1)
+        position = np.stack(cosine_and_sine(angle), axis=1)
         attrs = {"long_name": "position in the undeformed ring, in radii", "units": "1"}
         shapes["position"] = (("oscillator", "axis"), position, attrs)
         axis = ("axis", ["x", "y"], {"long_name": "axis", "units": "1"})
@@ -155,45 +160,92 @@ class OscillatorRing(CEAModel):
         -------
         Pencils
         """
-        size, count = values["mass"].shape
-        springs = _dyads(values["spring_stiffness"], values["spring_angle"], values["spring_angle"])
-        force = values["contact_stiffness"] * values["contact"]
-        contacts = _dyads(force, values["contact_angle"], values["contact_angle"])
-        frictions = _dyads(force, values["friction_angle"], values["contact_angle"])
-        blocks = np.zeros((size, count, 2, count, 2))
-        friction_blocks = np.zeros_like(blocks)
-        for i in range(count):
-            blocks[:, i, :, i, :] = springs[:, i] + springs[:, i + 1] + contacts[:, i]
-            friction_blocks[:, i, :, i, :] = frictions[:, i]
-        for i in range(count - 1):
-            blocks[:, i, :, i + 1, :] = -springs[:, i + 1]
-            blocks[:, i + 1, :, i, :] = -springs[:, i + 1]
-        n = 2 * count
-        mass = np.repeat(values["mass"], 2, axis=1)
-        stiffness = blocks.reshape(size, n, n)
+        pencils = self.entries(values).rows()
+        return replace(pencils, damping=_damping(pencils.mass, pencils.stiffness, values))
+
+    def compact(self, values: Mapping[str, Array]) -> CompactPencils | None:
+        """Return the undamped matrices of a batch by their entries, None if any sample is damped.
+
+        Parameters
+        ----------
+        values : mapping
+            As `assemble`.
+
+        Returns
+        -------
+        CompactPencils or None
+        """
+        return None if any(values[name].any() for name in DAMPING) else self.entries(values)
+
+    def entries(self, values: Mapping[str, Array]) -> CompactPencils:
+        """Return the matrices but for damping by their entries (equations 3 to 7).
+
+        Parameters
+        ----------
+        values : mapping
+            As `assemble`.
+
+        Returns
+        -------
+        CompactPencils
+        """
+        own = {name: _sample_last(values[name]) for name in values if values[name].ndim == 2}
+        count = self.oscillators
+        spring = cosine_and_sine(own["spring_angle"])
+        contact, friction = cosine_and_sine(own["contact_angle"]), cosine_and_sine(own["friction_angle"])
+        springs = _dyads(own["spring_stiffness"], spring, spring)
+        force = own["contact_stiffness"] * own["contact"]
+        contacts = _dyads(force, contact, contact)
+        blocks = springs[:, :, :-1] + springs[:, :, 1:]
+        blocks = np.add(blocks, contacts, out=contacts if contacts.shape == blocks.shape else None)
+        beside = np.negative(springs, out=springs)
+        stiffness = (
+            _at_blocks(blocks, [(i, i) for i in range(count)]),
+            _at_blocks(beside, [(i, i + 1) for i in range(count - 1)], first=1),
+            _at_blocks(beside, [(i + 1, i) for i in range(count - 1)], first=1),
+        )
+        friction_stiffness = (_at_blocks(_dyads(force, friction, contact), [(i, i) for i in range(count)]),)
         # Springs and contacts are N + 1 + contacts constraints on 2 N degrees of freedom; friction
         # acts through the same contact normals, so it removes no mechanism.
         contact_count = values["contact"].sum(axis=1).astype(np.intp)
-        return Pencils(
-            mass=mass,
+        return CompactPencils(
+            mass=np.repeat(own["mass"], 2, axis=0),
             stiffness=stiffness,
-            friction_stiffness=friction_blocks.reshape(size, n, n),
+            friction_stiffness=friction_stiffness,
             friction=np.array(values["friction"]),
-            damping=_damping(mass, stiffness, values),
             mechanisms=np.maximum(0, 2 * count - (count + 1) - contact_count),
             filter_radius=FILTER if count <= FILTER_OSCILLATORS else 0.0,
         )
 
 
-def _dyads(stiffness: Array, row_angle: Array, column_angle: Array) -> Array:
-    """Return stiffness times unit vector times unit vector transposed, (s, size, 2, 2)."""
-    row = (cosdg(row_angle), sindg(row_angle))
-    column = (cosdg(column_angle), sindg(column_angle))
-    dyads = np.empty((*stiffness.shape, 2, 2))
-    for i in range(2):
-        for j in range(2):
-            dyads[..., i, j] = stiffness * (row[i] * column[j])
+def _sample_last(values: Array) -> Array:
+    """Return values (s, size) as (size, s), or (size, 1) where one sample stands for all."""
+    return np.ascontiguousarray(values[:1].T if values.strides[0] == 0 else values.T)
+
+
+def _dyads(stiffness: Array, row: tuple[Array, Array], column: tuple[Array, Array]) -> Array:
+    """Return stiffness times unit vector times unit vector transposed, (2, 2, size, s).
+
+    Unit vectors are given by their cosines and sines, (size, s) or (size, 1), as the stiffness is.
+    """
+    dyads = rows_apart((2, 2, *np.broadcast_shapes(stiffness.shape, row[0].shape, column[0].shape)))
+    for x, y in np.ndindex(2, 2):
+        np.multiply(row[x], column[y], out=dyads[x, y])
+        dyads[x, y] *= stiffness
     return dyads
+
+
+def _at_blocks(blocks: Array, places: Sequence[tuple[int, int]], first: int = 0) -> Entries:
+    """Return blocks (2, 2, size, s), from the `first` on, as entries at these block rows and columns."""
+    size = blocks.shape[2]
+    return Entries.at(
+        blocks.reshape(4 * size, -1),
+        [
+            ((2 * x + y) * size + first + k, 2 * i + x, 2 * j + y)
+            for k, (i, j) in enumerate(places)
+            for x, y in np.ndindex(2, 2)
+        ],
+    )
 
 
 def _damping(mass: Array, stiffness: Array, values: Mapping[str, Array]) -> Array | None:
@@ -202,7 +254,7 @@ def _damping(mass: Array, stiffness: Array, values: Mapping[str, Array]) -> Arra
     Modal damping on the frictionless modes, ``C = 2 z M^(1/2) S M^(1/2)`` with S the root of
     ``M^(-1/2) K0 M^(-1/2)``, and Rayleigh damping ``a M + b K0``.
     """
-    ratio, alpha, beta = (values[name] for name in ("damping_ratio", "mass_damping", "stiffness_damping"))
+    ratio, alpha, beta = (values[name] for name in DAMPING)
     if not (ratio.any() or alpha.any() or beta.any()):
         return None
     damping: Array = beta[:, None, None] * stiffness

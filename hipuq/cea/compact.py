@@ -1,0 +1,88 @@
+"""A batch of pencils by the entries of its matrices: a fraction of their numbers, the sample last."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hipuq.cea.entries import Entries, dense
+from hipuq.cea.pencils import LARGEST, Array, Pencils
+
+
+@dataclass(frozen=True)
+class CompactPencils:
+    """Undamped pencils ``l**2 M + K0 + mu K1`` of s samples with n degrees of freedom.
+
+    Attributes
+    ----------
+    mass : (n, s) or (n, 1) array
+        Masses of a diagonal M [kg].
+    stiffness, friction_stiffness : tuple of Entries
+        K0 and K1 [N/m], sums of their parts.
+    friction : (s,) array
+        Friction coefficient mu [1].
+    mechanisms : (s,) array of int
+        As in `Pencils`.
+    filter_radius : float
+        As in `Pencils`.
+
+    Raises
+    ------
+    InputError
+        As `Pencils`.
+    """
+
+    mass: Array
+    stiffness: tuple[Entries, ...]
+    friction_stiffness: tuple[Entries, ...]
+    friction: Array
+    mechanisms: NDArray[np.intp]
+    filter_radius: float = 0.0
+
+    def __post_init__(self) -> None:
+        numbers = [entries.values for entries in (*self.stiffness, *self.friction_stiffness)]
+        fine = all(
+            values.max(initial=0.0) <= LARGEST and values.min(initial=0.0) >= -LARGEST
+            for values in (*numbers, self.friction)
+        )
+        fine &= bool(((self.mass > 0) & (self.mass <= LARGEST)).all())
+        fine &= bool(((self.mechanisms >= 0) & (self.mechanisms < len(self.mass))).all())
+        if not fine:
+            self.rows()
+
+    @classmethod
+    def of(cls, pencils: Pencils) -> CompactPencils:
+        """Return the same matrices without their damping, without a copy of diagonal masses and stiffness."""
+        rest = pencils.friction, pencils.mechanisms, pencils.filter_radius
+        if pencils.mass.ndim == 2:
+            stiffness, friction_stiffness = Entries.whole(pencils.stiffness), pencils.friction_stiffness
+            return cls(pencils.mass.T, (stiffness,), (Entries.whole(friction_stiffness),), *rest)
+        reduced = Entries.whole(replace(pencils, damping=None).reduced()[0])
+        return cls(np.ones((pencils.stiffness.shape[1], 1)), (reduced,), (), *rest)
+
+    def rows(self, samples: NDArray[np.intp] | slice = slice(None)) -> Pencils:
+        """Return the matrices of some samples, all by default.
+
+        Raises
+        ------
+        InputError
+            As `Pencils`, whose messages name what is wrong.
+        """
+        friction = self.friction[samples]
+        size, count = len(self.mass), len(friction)
+        mass = self.mass if self.mass.shape[1] == 1 else self.mass[:, samples]
+        stiffness, friction_stiffness = (
+            dense([part.of(samples) for part in parts], count, size)
+            for parts in (self.stiffness, self.friction_stiffness)
+        )
+        return Pencils(
+            mass=np.ascontiguousarray(np.broadcast_to(mass, (size, count)).T),
+            stiffness=stiffness,
+            friction_stiffness=friction_stiffness,
+            friction=friction,
+            damping=None,
+            mechanisms=self.mechanisms[samples],
+            filter_radius=self.filter_radius,
+        )

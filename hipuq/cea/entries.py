@@ -1,0 +1,89 @@
+"""Matrices of a batch by their entries, at places that all samples share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hipuq.cea.pencils import Array
+
+Places = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Entries:
+    """Numbers and where they stand; the matrices hold 0 elsewhere, and sums where places meet.
+
+    Attributes
+    ----------
+    values : (m, s) or (m, 1) array
+        Numbers, the sample last; one column holds for all samples.
+    source, row, column : (p,) array of int32
+        Place p holds ``values[source[p]]`` at (row[p], column[p]).
+    """
+
+    values: Array
+    source: Places
+    row: Places
+    column: Places
+
+    @classmethod
+    def whole(cls, matrices: Array) -> Entries:
+        """Return all entries of matrices, without a copy.
+
+        Parameters
+        ----------
+        matrices : (s, n, n) array
+        """
+        s, n = matrices.shape[:2]
+        row, column = np.indices((n, n), np.int32).reshape(2, -1)
+        values = matrices.reshape(s, n * n).T
+        return cls(values, np.arange(n * n, dtype=np.int32), row.copy(), column.copy())
+
+    @classmethod
+    def at(cls, values: Array, places: Sequence[tuple[int, int, int]]) -> Entries:
+        """Return entries from places (source, row, column).
+
+        Parameters
+        ----------
+        values : (m, s) or (m, 1) array
+        places : sequence of three int
+        """
+        source, row, column = np.array(places, np.int32).reshape(-1, 3).T.copy()
+        return cls(values, source, row, column)
+
+    def of(self, samples: NDArray[np.intp] | slice) -> Entries:
+        """Return the entries of some samples."""
+        values = self.values if self.values.shape[1] == 1 else self.values[:, samples]
+        return Entries(values, self.source, self.row, self.column)
+
+
+def rows_apart(shape: tuple[int, ...]) -> Array:
+    """Return an array to be filled whose rows along the last axis lie apart by no power of two.
+
+    The kernel reads the same samples of all rows at once: at a distance of a power of two they would
+    fall into the same few places of the processor's caches and push each other out.
+    """
+    return np.empty((*shape[:-1], shape[-1] + 8 if shape[-1] > 1 else 1))[..., : shape[-1]]
+
+
+def dense(entries: Sequence[Entries], samples: int, size: int) -> Array:
+    """Return the matrices.
+
+    Parameters
+    ----------
+    entries : sequence of Entries
+    samples, size : int
+
+    Returns
+    -------
+    (samples, size, size) array
+    """
+    matrices = np.zeros((samples, size, size))
+    for part in entries:
+        for source, row, column in zip(part.source, part.row, part.column, strict=True):
+            matrices[:, row, column] += part.values[source]
+    return matrices
