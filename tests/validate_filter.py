@@ -37,6 +37,7 @@ import hipuq
 from hipuq.cea import Pencils, solve
 from hipuq.cea.bounds import STRUCTURED, ZERO, norms
 from hipuq.cea.damped import _without_mechanisms
+from hipuq.cea.eigenvalues import eigenvalues
 from hipuq.cea.structured import SAFETY, structured_eigenvalues
 from hipuq.cea.undamped import judge as judge_roots
 
@@ -136,14 +137,14 @@ def exact_growing(stiffness: np.ndarray, damping: np.ndarray, threshold: float) 
 
 
 def plain_verdicts(pencils: Pencils, threshold: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what LAPACK says, whether the filter clears it, and how far it is from changing."""
+    """Return what the eigenvalues say, whether the filter clears it, and how far it is from changing."""
     matrices, damping = pencils.reduced()
     mechanisms = pencils.mechanisms
     s = len(matrices)
     verdict, cleared, distance = np.empty(s, bool), np.empty(s, bool), np.empty(s)
     if damping is None:
         norm = norms(matrices)[:, None]
-        values = np.linalg.eigvals(matrices).astype(complex)
+        values = eigenvalues(matrices)
         radius = np.broadcast_to((pencils.filter_radius or np.inf) * norm, values.shape)
         rigid, known = judge_roots(values, radius, ZERO * norm, mechanisms, threshold)
         growth = np.where(rigid, 0.0, np.abs(np.sqrt(-values).real)).max(axis=1)
@@ -162,7 +163,7 @@ def plain_verdicts(pencils: Pencils, threshold: float) -> tuple[np.ndarray, np.n
         states[:, :n, n:] = np.eye(n)
         states[:, n:, :n] = -part / np.square(rate)[:, :, None]
         states[:, n:, n:] = -drag / rate[:, :, None]
-        above = np.linalg.eigvals(states).real - threshold / rate
+        above = eigenvalues(states).real - threshold / rate
         norm = norms(states)
         verdict[rows] = (above > 0).any(axis=1)
         cleared[rows] = (np.abs(above) > (pencils.filter_radius or np.inf) * norm[:, None]).all(axis=1)
@@ -173,7 +174,7 @@ def plain_verdicts(pencils: Pencils, threshold: float) -> tuple[np.ndarray, np.n
 def structured_error(matrix: np.ndarray) -> float:
     """Return the largest error of the structured solver over eps * structured condition number."""
     exact = np.array([complex(ball) for ball, _ in oracle.exact_roots(matrix)])
-    start = np.linalg.eigvals(matrix).astype(complex)
+    start = eigenvalues(matrix[None])[0]
     values, radius = structured_eigenvalues(matrix[None], start[None], 2)
     elastic = np.abs(values[0]) > oracle.RIGID * np.abs(exact).max()
     error = np.abs(values[0][:, None] - exact).min(axis=1)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hipuq.cea.eigenvalues import LARGEST_SIZE
 from hipuq.cea.pencils import Array
+from hipuq.compiled.library import kernel
 
 Complex = NDArray[np.complex128]
 
@@ -29,7 +31,9 @@ ZERO = 1e-12
 
 def norms(matrices: Array) -> Array:
     """Return the Frobenius norm of each matrix, (s,)."""
-    norm: Array = np.sqrt(np.square(matrices).sum(axis=(1, 2)))
+    s, n, m = matrices.shape
+    flat = matrices.reshape(s, n * m)
+    norm: Array = np.sqrt(np.vecdot(flat, flat))
     return norm
 
 
@@ -61,7 +65,36 @@ def conditioned_eigenvalues(matrices: Array) -> tuple[Complex, Array]:
     values : (s, n) complex array
     radius : (s, n) array
         SAFETY * eps * norm * condition number, infinite where the eigenvectors are dependent.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If a value is not finite, or the iteration does not end.
     """
+    values, condition = _by_lanes(matrices) or _by_lapack(matrices)
+    return values, SAFETY * EPS * norms(matrices)[:, None] * condition
+
+
+def _by_lanes(matrices: Array) -> tuple[Complex, Array] | None:
+    """Return eigenvalues and condition numbers, None where LAPACK is to find them."""
+    s, n = matrices.shape[:2]
+    compiled = kernel()
+    if compiled is None or n > LARGEST_SIZE or not matrices.size:
+        return None
+    matrices = np.ascontiguousarray(matrices, np.float64)
+    if not np.isfinite(matrices).all():
+        raise np.linalg.LinAlgError("Array must not contain infs or NaNs")
+    values, condition, failed = np.empty((s, n), np.complex128), np.empty((s, n)), np.empty(s, np.bool_)
+    into = values.ctypes.data, condition.ctypes.data, failed.ctypes.data
+    if compiled.conditioned(s, n, matrices.ctypes.data, *into):
+        raise MemoryError("no memory for the compiled kernel")
+    if failed.any():
+        values[failed], condition[failed] = _by_lapack(matrices[failed])
+    return values, condition
+
+
+def _by_lapack(matrices: Array) -> tuple[Complex, Array]:
+    """Return eigenvalues and condition numbers."""
     values, right = np.linalg.eig(matrices)
     # Real where all samples of the batch are real: the inverse must not depend on the company.
     right = right.astype(np.complex128)
@@ -73,7 +106,7 @@ def conditioned_eigenvalues(matrices: Array) -> tuple[Complex, Array]:
     with np.errstate(over="ignore", invalid="ignore"):
         condition = np.linalg.norm(left, axis=2) * np.linalg.norm(right, axis=1)
     condition = np.where(np.isfinite(condition), condition, np.inf)
-    return values.astype(np.complex128), SAFETY * EPS * norms(matrices)[:, None] * condition
+    return values.astype(np.complex128), condition
 
 
 def _inverse(matrix: Complex) -> Complex:

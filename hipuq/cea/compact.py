@@ -41,6 +41,11 @@ class CompactPencils:
     mechanisms: NDArray[np.intp]
     filter_radius: float = 0.0
 
+    @property
+    def size(self) -> int:
+        """Number of degrees of freedom n."""
+        return len(self.mass)
+
     def __post_init__(self) -> None:
         numbers = [entries.values for entries in (*self.stiffness, *self.friction_stiffness)]
         fine = all(

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.bounds import DOUBLE, ZERO
+from hipuq.cea.bounds import DOUBLE, EPS, SAFETY, ZERO
 from hipuq.cea.compact import CompactPencils
 from hipuq.cea.entries import Entries
 from hipuq.cea.pencils import Array
 from hipuq.cea.spectra import Spectra
-from hipuq.compiled.library import Batch, Modes, Term
+from hipuq.compiled.library import Batch, Bounds, Modes, Term
 
 
 def lane_modes(compiled: Any, pencils: CompactPencils, threshold: float) -> tuple[Spectra, NDArray[np.bool_]]:
@@ -24,7 +24,7 @@ def lane_modes(compiled: Any, pencils: CompactPencils, threshold: float) -> tupl
     compiled : Kernel
         Of `hipuq.compiled.library`.
     pencils : CompactPencils
-        Of a family whose filter radius is known.
+        Errors are bounded by the filter radius; where it is 0, by the condition number of each eigenvalue.
     threshold : float
         Growth rate above which a mode is unstable [1/s].
 
@@ -62,7 +62,8 @@ def lane_modes(compiled: Any, pencils: CompactPencils, threshold: float) -> tupl
         margin=spectra.margin.ctypes.data,
         open=open_.ctypes.data,
     )
-    if compiled.undamped(ctypes.byref(batch), threshold, pencils.filter_radius, ZERO, ctypes.byref(into)):
+    bounds = Bounds(filter_radius=pencils.filter_radius, rounding=SAFETY * EPS, zero=ZERO)
+    if compiled.undamped(ctypes.byref(batch), threshold, ctypes.byref(bounds), ctypes.byref(into)):
         raise MemoryError("no memory for the compiled kernel")
     return spectra, open_
 

@@ -38,7 +38,8 @@ class Pencils:
         construction. Floating point cannot find it, so the model declares it.
     filter_radius : float
         Radius, relative to the norm, that was shown by exact arithmetic to hold the errors of
-        LAPACK's eigenvalues of this family of matrices where no verdict is closer to changing.
+        eigenvalues of this family of matrices, LAPACK's and the compiled kernel's, where no verdict is closer
+        to changing.
         0, as for matrices of which nothing is known: every verdict needs condition numbers.
 
     Raises
@@ -84,6 +85,11 @@ class Pencils:
             raise InputError(f"mass must be positive, it is {self.mass[bad].min()} in sample {bad}")
         if (self.mechanisms < 0).any() or (self.mechanisms >= n).any():
             raise InputError(f"mechanisms must lie between 0 and {n - 1}, they are {self.mechanisms}")
+
+    @property
+    def size(self) -> int:
+        """Number of degrees of freedom n."""
+        return int(self.stiffness.shape[1])
 
     @property
     def damped(self) -> NDArray[np.bool_]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from hipuq.cea.bounds import ALWAYS, AUTO, NEVER
 from hipuq.cea.compact import CompactPencils
 from hipuq.cea.damped import damped_modes
+from hipuq.cea.eigenvalues import LARGEST_SIZE
 from hipuq.cea.lanes import lane_modes
 from hipuq.cea.pencils import Array, Pencils
 from hipuq.cea.spectra import Spectra
@@ -69,7 +70,7 @@ def solve(
 def _by_lanes(pencils: Pencils | CompactPencils, threshold: float) -> tuple[Spectra, NDArray[np.intp]] | None:
     """Let the compiled kernel judge what it can; return that and the samples that it leaves open."""
     compiled = kernel()
-    if compiled is None or not pencils.filter_radius:
+    if compiled is None or pencils.size > LARGEST_SIZE:
         return None
     if isinstance(pencils, CompactPencils):
         spectra, open_ = lane_modes(compiled, pencils, threshold)

@@ -4,6 +4,9 @@
 
 #include <stdint.h>
 
+/* Goes up with every change of what follows: a library left over from older sources is not used. */
+enum { HIPUQ_INTERFACE = 3 };
+
 /* Entries of the matrices of all samples, at places that they share: entry p of sample s is
  * values[source[p] * row_stride + s * sample_stride] at (row[p], column[p]). */
 typedef struct {
@@ -21,6 +24,12 @@ typedef struct {
     const int64_t *mechanisms;
 } HipuqBatch;
 
+/* Bounds of errors over the norm of a matrix: `filter_radius` for every eigenvalue of the family; where it
+ * is 0, `rounding` times the condition number. A declared mechanism is within `zero`, or its own bound. */
+typedef struct {
+    double filter_radius, rounding, zero;
+} HipuqBounds;
+
 /* Outcomes: (samples, size) the first three, (samples) the others. `open` is 1
  * where double precision leaves a verdict open: nothing else is said of such a sample. */
 typedef struct {
@@ -34,8 +43,12 @@ typedef struct {
  * where the iteration did not end. Returns -1 where memory is short. */
 typedef int HipuqEigenvalues(int64_t samples, int64_t n, const double *matrices, double *values, uint8_t *failed);
 
+/* The same with the condition number of each eigenvalue, (samples, n); see conditions.h. */
+typedef int HipuqConditioned(int64_t samples, int64_t n, const double *matrices, double *values,
+                             double *condition, uint8_t *failed);
+
 /* Modes and verdicts of undamped pencils; see modes.h. Returns -1 where memory is short. */
-typedef int HipuqUndamped(const HipuqBatch *batch, double threshold, double filter_radius, double zero,
+typedef int HipuqUndamped(const HipuqBatch *batch, double threshold, const HipuqBounds *bounds,
                           const HipuqModes *modes);
 
 typedef void HipuqDegrees(int64_t count, const double *angle, double *cosine, double *sine);
@@ -45,6 +58,7 @@ typedef struct {
     const char *name;
     int lanes;
     HipuqEigenvalues *eigenvalues;
+    HipuqConditioned *conditioned;
     HipuqUndamped *undamped;
     HipuqDegrees *degrees;
 } HipuqKernel;

@@ -20,6 +20,10 @@ TARGETS = ("avx512", "avx2", "baseline")
 FILE = "_kernel" + {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 
+INTERFACE = 3
+"""``HIPUQ_INTERFACE`` of `kernel.h`."""
+
+
 class Term(Structure):
     """Entries of the matrices of all samples; strides count doubles."""
 
@@ -52,6 +56,12 @@ class Batch(Structure):
     )
 
 
+class Bounds(Structure):
+    """Bounds of the errors of eigenvalues over the norm."""
+
+    _fields_ = (("filter_radius", c_double), ("rounding", c_double), ("zero", c_double))
+
+
 class Modes(Structure):
     """Where outcomes go."""
 
@@ -71,7 +81,8 @@ class Kernel(Structure):
         ("name", ctypes.c_char_p),
         ("lanes", c_int),
         ("eigenvalues", ctypes.CFUNCTYPE(c_int, c_int64, c_int64, c_void_p, c_void_p, c_void_p)),
-        ("undamped", ctypes.CFUNCTYPE(c_int, POINTER(Batch), c_double, c_double, c_double, POINTER(Modes))),
+        ("conditioned", ctypes.CFUNCTYPE(c_int, c_int64, c_int64, c_void_p, c_void_p, c_void_p, c_void_p)),
+        ("undamped", ctypes.CFUNCTYPE(c_int, POINTER(Batch), c_double, POINTER(Bounds), POINTER(Modes))),
         ("degrees", ctypes.CFUNCTYPE(None, c_int64, c_void_p, c_void_p, c_void_p)),
     )
 
@@ -88,7 +99,7 @@ def kernel() -> Any:
     Raises
     ------
     InputError
-        If `SWITCH` names no kernel, or one that cannot run here.
+        If `SWITCH` names no kernel or one that cannot run here, or the library is of another version.
     """
     wanted = os.environ.get(SWITCH, "")
     if wanted not in ("", LAPACK, *TARGETS):
@@ -103,9 +114,21 @@ def kernel() -> Any:
                 f"{SWITCH} is {wanted!r}, but the compiled library is missing: {error}"
             ) from None
         return None
+    interface = getattr(library, "hipuq_interface", None)
+    if interface is None or interface() != INTERFACE:
+        raise InputError(
+            f"the compiled library {FILE} is of another version of hipuq: install hipuq again, "
+            f"or set {SWITCH}={LAPACK}"
+        )
     choose = library.hipuq_kernel
     choose.argtypes, choose.restype = [ctypes.c_char_p], POINTER(Kernel)
     found = choose(wanted.encode())
     if not found:
         raise InputError(f"{SWITCH} is {wanted!r}: this library or processor has no such kernel")
     return found.contents
+
+
+def kernel_name() -> str:
+    """Return the name of the kernel in use, which bits may depend on: an instruction set, or LAPACK's."""
+    compiled = kernel()
+    return LAPACK if compiled is None else compiled.name.decode()

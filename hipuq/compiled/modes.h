@@ -1,7 +1,8 @@
 /* Modes, verdicts and margins of undamped samples from the eigenvalues w of their stiffness.
  *
- * The rules are those of hipuq/cea/undamped.py, with the uniform radius of the family as the bound of
- * rounding: a sample that it does not clear stays open, for those who know more.
+ * The rules are those of hipuq/cea/undamped.py. What bounds the errors of rounding is the uniform radius of the
+ * family or, where there is none, the condition number of each root; a sample that is not cleared so stays
+ * open, for those who know more.
  */
 #ifndef HIPUQ_MODES_H
 #define HIPUQ_MODES_H
@@ -13,9 +14,10 @@
 
 static const double TWO_PI = 6.28318530717958647692;
 
-/* Roots of LANES samples: w = re + i im, and a key by which modes are put in order. */
+/* Roots of LANES samples: w = re + i im, how far each may be from its true place, and a key by which modes
+ * are put in order. */
 typedef struct {
-    Vec *restrict re, *restrict im, *restrict key;
+    Vec *restrict re, *restrict im, *restrict radius, *restrict key;
 } Roots;
 
 /* Numbers that belong to a sample as a whole. */
@@ -55,38 +57,39 @@ INLINE void mode_of(Vec re, Vec im, Vec *frequency, Vec *growth)
 }
 
 /* Mark the declared number of smallest roots by the key -inf, the others by 0. Returns the lanes in which
- * all of them are within `zero`. */
-static Mask take_mechanisms(int n, Roots roots, Mask count, Vec zero)
+ * all of them are within `zero` or, with `own`, within their radius. */
+static Mask take_mechanisms(int n, Roots roots, Mask count, Vec zero, int own)
 {
     Mask fits = whole(-1);
     for (int k = 0; k < n; k++)
         roots.key[k] = all(0);
     for (int64_t taken = 0; any(count > taken); taken++) {
-        Vec least = all(INFINITY);
+        Vec least = all(INFINITY), bound = zero;
         Mask where = whole(-1);
         for (int k = 0; k < n; k++) {
             const Vec size = modulus(roots.re[k], roots.im[k]);
             const Mask less = (roots.key[k] == 0.0) & (size < least);
             least = pick(less, size, least);
+            if (own)
+                bound = pick(less, larger(zero, roots.radius[k]), bound);
             where = pick_whole(less, whole(k), where);
         }
         const Mask wanted = count > taken;
         for (int k = 0; k < n; k++)
             roots.key[k] = pick(wanted & (where == whole(k)), all(-INFINITY), roots.key[k]);
-        fits &= ~wanted | (least <= zero);
+        fits &= ~wanted | (least <= bound);
     }
     return fits;
 }
 
-/* The lanes in which every root's side is beyond an error of `radius`. Without a threshold: a complex
- * root farther from the real line, a real one away from zero and from every other root's disc. */
-static Mask known_sides(int n, Roots roots, double threshold, Vec radius)
+/* The lanes in which every root's side is beyond its error. Without a threshold: a complex root farther
+ * from the real line, a real one whose disc touches neither zero nor another root's disc. */
+static Mask known_sides(int n, Roots roots, double threshold)
 {
     Mask known = whole(-1);
-    const Vec reach = 4.0 * radius * radius;
     for (int i = 0; i < n; i++) {
         const Mask rigid = roots.key[i] < 0.0;
-        const Vec re = roots.re[i], im = roots.im[i], size = modulus(re, im);
+        const Vec re = roots.re[i], im = roots.im[i], radius = roots.radius[i], size = modulus(re, im);
         const Mask real = im == 0.0;
         if (threshold > 0.0) {
             Vec frequency, growth;
@@ -99,8 +102,8 @@ static Mask known_sides(int n, Roots roots, double threshold, Vec radius)
         for (int j = 0; j < n; j++) {
             if (j == i)
                 continue;
-            const Vec x = re - roots.re[j], y = im - roots.im[j];
-            apart &= (plus(x * x, y, y) > reach) | (roots.key[j] < 0.0);
+            const Vec x = re - roots.re[j], y = im - roots.im[j], reach = radius + roots.radius[j];
+            apart &= (plus(x * x, y, y) > reach * reach) | (roots.key[j] < 0.0);
         }
         known &= rigid | pick_whole(real, apart, size_of(im) > radius);
     }

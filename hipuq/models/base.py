@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hipuq import schema
 from hipuq.cea import ALWAYS, AUTO, NEVER, CompactPencils, Pencils, Spectra, mode_shapes, solve
+from hipuq.compiled.library import kernel
 from hipuq.errors import InputError, SchemaError, check_name, unknown_name
 from hipuq.inputs import Inputs
 from hipuq.models.parameter import Parameter
@@ -72,6 +73,7 @@ class CEAModel(ABC):
                 f"growth_threshold is {growth_threshold}: it must be a finite number of 1/s, 0 or above"
             )
         check_name("way to certify", certify, (AUTO, ALWAYS, NEVER))
+        kernel()  # a library or a switch that is wrong shows here, not in every sample
         self.preset = preset
         self.certify = certify
         self.parameters = dict(parameters)

@@ -6,14 +6,16 @@ import platform
 from contextlib import suppress
 from importlib import metadata
 
+from hipuq.compiled.library import kernel_name
+
 PACKAGES = ("hipuq", "numpy", "scipy", "xarray", "chaospy", "SALib", "python-flint")
 """Packages that numbers depend on."""
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages that numbers depend on, as far as there are any."""
+    """Return the versions of Python and of the packages that numbers depend on, and the eigenvalue kernel."""
     found = {"python": platform.python_version()}
     for name in PACKAGES:
         with suppress(metadata.PackageNotFoundError):
             found[name] = metadata.version(name)
-    return found
+    return found | {"kernel": kernel_name()}
