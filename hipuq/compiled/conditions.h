@@ -123,7 +123,7 @@ INLINE Vec left_vector(int n, int k, int ld, Parts t, Parts y)
 }
 
 /* Eigenvalues w and their condition numbers, infinite where they are beyond double precision. `t` has
- * room for 2 n rows and holds the matrices, which are overwritten; `copy` holds n ld vectors, `work` 7 n,
+ * room for 2 n rows and holds the matrices, which are overwritten; `copy` holds n ld vectors, `work` 11 n,
  * `down` n. Returns the lanes in which the iteration did not end. */
 static Mask conditions_of(int n, int ld, Parts t, Vec *restrict copy, Vec *restrict work, Vec *restrict down,
                           Parts w, Vec *restrict condition)

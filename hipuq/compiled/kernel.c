@@ -28,7 +28,7 @@ static Room room_of(int n, int rows)
     /* An odd distance of rows spreads a column over the sets of the cache. */
     room.ld = n | 1;
     const size_t matrix = (size_t)(rows + 2) * (size_t)room.ld, copy = (size_t)n * (size_t)room.ld;
-    const size_t vectors = matrix + copy + 11 * (size_t)n;
+    const size_t vectors = matrix + copy + 15 * (size_t)n;
     room.block = malloc((vectors + 1) * sizeof(Vec));
     if (!room.block)
         return room;
@@ -37,7 +37,7 @@ static Room room_of(int n, int rows)
     memset(room.matrix, 0, vectors * sizeof(Vec));
     room.copy = room.matrix + matrix;
     room.work = room.copy + copy;
-    room.re = room.work + 7 * n;
+    room.re = room.work + 11 * n;
     room.im = room.re + n;
     room.radius = room.im + n;
     room.key = room.radius + n;

@@ -1,9 +1,8 @@
-/* One step of Ehrlich and Aberth for the eigenvalues of a Hessenberg matrix, with Hyman's method for
- * the characteristic polynomial: it takes away most of what rounding did in the sweeps.
+/* One Newton step for the eigenvalues of a Hessenberg matrix, with Hyman's method for the characteristic
+ * polynomial and its derivative: it takes away most of what rounding did in the sweeps.
  *
  * J. H. Wilkinson, The Algebraic Eigenvalue Problem (1965), chapter 7, sections 9 to 12: Hyman's method is
- * backward stable, entry by entry; D. A. Bini, L. Gemignani, F. Tisseur, SIAM J. Matrix Anal. Appl. 27 (2005)
- * 153: the step with the other eigenvalues kept off.
+ * backward stable, entry by entry.
  */
 #ifndef HIPUQ_POLISH_H
 #define HIPUQ_POLISH_H
@@ -20,83 +19,102 @@ INLINE Complex quotient(Complex a, Complex b)
     return (Complex){plus(a.re * b.re, a.im, b.im) * inverse, minus(a.im * b.re, a.re, b.im) * inverse};
 }
 
-/* Characteristic polynomial p over its derivative at w. `inverse` holds -1 over the subdiagonal; `work`, 4 n
- * vectors, the solution of (H - w) x = p e_1 with a one at its end, and its derivative. With `real` all w
- * are; a real w gets the same bits without. */
-INLINE Complex newton(int n, int ld, const Vec *restrict h, const Vec *restrict inverse, Complex w, int real,
-                      Vec *restrict work)
+/* Two at a time, so that one sum need not wait for the other. */
+enum { AT_A_TIME = 2 };
+
+typedef struct {
+    Vec *re, *im; /* values, one vector of n for each eigenvalue at a time */
+} Solutions;
+
+/* Characteristic polynomial p over its derivative at each w. `inverse` holds -1 over the subdiagonal; `x`
+ * takes the solution of (H - w) x = p e_1 with a one at its end, `dx` its derivative. With `real` all w are
+ * on the real line; there is no difference in the bits of those that are. */
+INLINE void newton(int n, int ld, const Vec *restrict h, const Vec *restrict inverse, const Complex *w, int real,
+                   Solutions x, Solutions dx, Complex *step)
 {
-    Vec *restrict x = work, *restrict dx = work + n, *restrict y = work + 2 * n, *restrict dy = work + 3 * n;
-    x[n - 1] = all(1), dx[n - 1] = all(0), y[n - 1] = all(0), dy[n - 1] = all(0);
-    Complex p = {all(0), all(0)}, d = p;
+    Complex p[AT_A_TIME], d[AT_A_TIME];
+    for (int g = 0; g < AT_A_TIME; g++) {
+        x.re[g * n + n - 1] = all(1);
+        x.im[g * n + n - 1] = dx.re[g * n + n - 1] = dx.im[g * n + n - 1] = all(0);
+    }
     for (int i = n - 1; i >= 0; i--) {
         const Vec *row = h + i * ld;
-        p.re = (row[i] - w.re) * x[i];
-        d.re = minus((row[i] - w.re) * dx[i], all(1), x[i]);
-        if (!real) {
-            p.re = plus(p.re, w.im, y[i]);
-            p.im = minus((row[i] - w.re) * y[i], w.im, x[i]);
-            d.re = plus(d.re, w.im, dy[i]);
-            d.im = minus((row[i] - w.re) * dy[i], w.im, dx[i]) - y[i];
-        }
-        for (int j = i + 1; j < n; j++) {
-            p.re = plus(p.re, row[j], x[j]);
-            d.re = plus(d.re, row[j], dx[j]);
+        for (int g = 0; g < AT_A_TIME; g++) {
+            const int at = g * n + i;
+            const Vec off = row[i] - w[g].re;
+            p[g].re = off * x.re[at];
+            d[g].re = off * dx.re[at] - x.re[at];
             if (!real) {
-                p.im = plus(p.im, row[j], y[j]);
-                d.im = plus(d.im, row[j], dy[j]);
+                p[g].re = plus(p[g].re, w[g].im, x.im[at]);
+                p[g].im = minus(off * x.im[at], w[g].im, x.re[at]);
+                d[g].re = plus(d[g].re, w[g].im, dx.im[at]);
+                d[g].im = minus(off * dx.im[at], w[g].im, dx.re[at]) - x.im[at];
             }
         }
-        if (i == 0)
-            break;
-        x[i - 1] = p.re * inverse[i], dx[i - 1] = d.re * inverse[i];
-        if (!real)
-            y[i - 1] = p.im * inverse[i], dy[i - 1] = d.im * inverse[i];
+        for (int j = i + 1; j < n; j++)
+            for (int g = 0; g < AT_A_TIME; g++) {
+                p[g].re = plus(p[g].re, row[j], x.re[g * n + j]);
+                d[g].re = plus(d[g].re, row[j], dx.re[g * n + j]);
+                if (!real) {
+                    p[g].im = plus(p[g].im, row[j], x.im[g * n + j]);
+                    d[g].im = plus(d[g].im, row[j], dx.im[g * n + j]);
+                }
+            }
+        for (int g = 0; i > 0 && g < AT_A_TIME; g++) {
+            const int next = g * n + i - 1;
+            x.re[next] = p[g].re * inverse[i], dx.re[next] = d[g].re * inverse[i];
+            if (!real)
+                x.im[next] = p[g].im * inverse[i], dx.im[next] = d[g].im * inverse[i];
+        }
     }
-    const Mask on_line = w.im == 0.0;
-    const Complex off = quotient(p, d);
-    return (Complex){pick(on_line, p.re / d.re, off.re), pick(on_line, all(0), off.im)};
+    for (int g = 0; g < AT_A_TIME; g++) {
+        const Mask on_line = w[g].im == 0.0;
+        const Complex off_line = real ? p[g] : quotient(p[g], d[g]);
+        step[g].re = pick(on_line, p[g].re / d[g].re, off_line.re);
+        step[g].im = real ? all(0) : pick(on_line, all(0), off_line.im);
+    }
 }
 
-/* Better eigenvalues of the Hessenberg matrix h. A step that is not small beside the distance of the
- * nearest neighbour is not taken. `work` holds 7 n vectors. */
+/* Move root k by its step, if that is small beside the distance of the nearest neighbour. */
+INLINE Complex moved(int n, int k, Complex step, const Vec *restrict re, const Vec *restrict im)
+{
+    const Complex w = {re[k], im[k]};
+    Vec nearest = all(INFINITY);
+    for (int j = 0; j < n; j++) {
+        if (j == k)
+            continue;
+        const Vec x = w.re - re[j], y = w.im - im[j], square = plus(x * x, y, y);
+        nearest = smaller(nearest, square);
+    }
+    const Mask take = 256.0 * plus(step.re * step.re, step.im, step.im) < nearest;
+    return (Complex){pick(take, w.re - step.re, w.re), pick(take & (w.im != 0.0), w.im - step.im, w.im)};
+}
+
+/* Better eigenvalues of the Hessenberg matrix h; of a pair the upper one first. `work` holds 11 n vectors. */
 static void polish(int n, int ld, const Vec *restrict h, Vec *restrict re, Vec *restrict im,
                    Vec *restrict work)
 {
-    Vec *restrict new_re = work + 4 * n, *restrict new_im = work + 5 * n, *restrict inverse = work + 6 * n;
+    Vec *restrict new_re = work, *restrict new_im = work + n, *restrict inverse = work + 2 * n;
+    const Solutions x = {work + 3 * n, work + 5 * n}, dx = {work + 7 * n, work + 9 * n};
     for (int j = 1; j < n; j++)
         inverse[j] = -1.0 / h[j * ld + j - 1];
-    for (int k = 0; k < n; k++) {
-        const Complex w = {re[k], im[k]};
-        const Mask lower = w.im < 0.0;
-        new_re[k] = w.re, new_im[k] = w.im;
-        if (any(~lower)) {
-            const Complex step = any(w.im != 0.0) ? newton(n, ld, h, inverse, w, 0, work)
-                                                  : newton(n, ld, h, inverse, w, 1, work);
-            Complex others = {all(0), all(0)};
-            Vec nearest = all(INFINITY);
-            for (int j = 0; j < n; j++) {
-                if (j == k)
-                    continue;
-                const Vec x = w.re - re[j], y = w.im - im[j], square = plus(x * x, y, y);
-                nearest = smaller(nearest, square);
-                const Vec inverse = 1.0 / square;
-                others.re = plus(others.re, x, inverse);
-                others.im = minus(others.im, y, inverse);
-            }
-            /* 1 - step * others */
-            const Complex keep = {plus(minus(all(1), step.re, others.re), step.im, others.im),
-                                  minus(minus(all(0), step.re, others.im), step.im, others.re)};
-            const Complex move = quotient(step, keep);
-            const Vec size = plus(move.re * move.re, move.im, move.im);
-            const Mask take = (16.0 * size < nearest) & ~lower;
-            const Mask on_line = w.im == 0.0;
-            new_re[k] = pick(take, w.re - move.re, w.re);
-            new_im[k] = pick(take & ~on_line, w.im - move.im, w.im);
+    for (int first = 0; first < n; first += AT_A_TIME) {
+        Complex w[AT_A_TIME], step[AT_A_TIME];
+        Mask off_line = whole(0);
+        for (int g = 0; g < AT_A_TIME; g++) {
+            const int k = first + g < n ? first + g : n - 1;
+            w[g] = (Complex){re[k], im[k]};
+            off_line |= w[g].im != 0.0;
         }
-        if (k > 0) {
-            new_re[k] = pick(lower, new_re[k - 1], new_re[k]);
-            new_im[k] = pick(lower, -new_im[k - 1], new_im[k]);
+        if (any(off_line))
+            newton(n, ld, h, inverse, w, 0, x, dx, step);
+        else
+            newton(n, ld, h, inverse, w, 1, x, dx, step);
+        for (int k = first; k < n && k < first + AT_A_TIME; k++) {
+            const Complex now = moved(n, k, step[k - first], re, im);
+            const Mask lower = im[k] < 0.0; /* the conjugate of the one before */
+            new_re[k] = k > 0 ? pick(lower, new_re[k - 1], now.re) : now.re;
+            new_im[k] = k > 0 ? pick(lower, -new_im[k - 1], now.im) : now.im;
         }
     }
     for (int k = 0; k < n; k++) {
