@@ -184,7 +184,7 @@ class FrictionIntegrated:
         return self._outcomes(cells, wanted)
 
     def _outcomes(self, cells: list[Cells], wanted: list[str]) -> xr.Dataset:
-        mass = [self._mass(one) for one in cells]
+        mass = self._mass(cells)
         unstable, decided = _shares(mass, [one.any_unstable[:, None] for one in cells])
         by_mode, modes_decided = _shares(mass, [one.unstable for one in cells])
         known = np.array([not np.isnan(one.any_unstable).any() for one in cells])
@@ -220,19 +220,23 @@ class FrictionIntegrated:
         coords = self.model.mode_coordinates() if "probability_by_mode" in wanted else {}
         return xr.Dataset(data, coords=coords)
 
-    def _mass(self, cells: Cells) -> Array:
+    def _mass(self, cells: list[Cells]) -> list[Array]:
         """Return the probability that friction is in each cell; a boundary goes to the stabler side."""
         cdf = self.distribution.cdf
         assert cdf is not None
-        inner = cells.edges[1:-1]
-        count = cells.count
-        rises = count[1:] > count[:-1]
-        split = cdf(inner + np.where(rises, SIDE, -SIDE) * np.abs(inner)) if inner.size else inner
         first = float(cdf(np.array([np.nextafter(self.lower, -np.inf)]))[0])
         last = float(cdf(np.array([self.upper]))[0])
+        places = []
+        for one in cells:
+            rises = one.count[1:] > one.count[:-1]
+            inner = one.edges[1:-1]
+            places.append(inner + np.where(rises, SIDE, -SIDE) * np.abs(inner))
+        ends = np.cumsum([len(own) for own in places])
+        together = np.concatenate(places)
+        split = np.split(cdf(together) if together.size else together, ends[:-1])
         # Boundaries nearer to each other, or to an end, than SIDE must not change places.
-        ascending = np.maximum.accumulate(np.clip(split, first, last))
-        return np.diff(np.concatenate([[first], ascending, [last]]))
+        ascending = [np.maximum.accumulate(np.clip(own, first, last)) for own in split]
+        return [np.diff(np.concatenate([[first], own, [last]])) for own in ascending]
 
     def _swept(self) -> tuple[float, float]:
         """Return the range, a little wider at an end that is an atom: a boundary there is to be found."""

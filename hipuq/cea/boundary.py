@@ -9,7 +9,8 @@ import numpy as np
 
 from hipuq.cea.bounds import Complex
 from hipuq.cea.certificate import certify_polynomial
-from hipuq.cea.exact import ExactPencil, exact_gap
+from hipuq.cea.eigenvalues import eigenvalues
+from hipuq.cea.exact import ExactPencil, coalescence, exact_gap, gap_about, scaled, whole
 from hipuq.cea.gaps import Bracket
 from hipuq.cea.pencils import Array
 from hipuq.cea.points import Rows, Sweep, structured_values
@@ -74,26 +75,50 @@ def proved(sweep: Sweep, brackets: list[Bracket]) -> list[list[Boundary]]:
         exact[i] = ExactPencil(sweep.constant[i], sweep.slope[i])
     if not brackets:
         return [[] for _ in range(len(sweep.constant))]
-    solved = [_solved(exact[one.row], one, int(sweep.mechanisms[one.row])) for one in brackets]
-    sides = np.array([[x - SIDE * abs(x), x + SIDE * abs(x)] for x, _ in solved])
     row = np.array([one.row for one in brackets], np.intp)
-    near = _approximations(sweep, np.repeat(row, 2), sides.ravel()).reshape(len(row), 2, -1)
+    solved = [_solved(exact[one.row], one, int(sweep.mechanisms[one.row])) for one in brackets]
+    # Both sides of a boundary are so near to it that its roots will do for them.
+    near = _approximations(sweep, row, np.array([one.friction for one in solved]))
     result: list[list[Boundary]] = [[] for _ in range(len(sweep.constant))]
-    for bracket, (friction, centre), ends, start in zip(brackets, solved, sides, near, strict=True):
+    for bracket, place, start in zip(brackets, solved, near, strict=True):
         prove = _flutter if bracket.change[0] else _divergence
         own = exact[bracket.row]
-        boundary = prove(sweep, own, bracket, (friction, centre), ends, start)
+        boundary = prove(sweep, own, bracket, place, start)
         if boundary.certified or _differs(sweep, own, bracket):
             result[bracket.row].append(boundary)
     ordered = (sorted(part, key=lambda one: one.friction) for part in result)
     return [_beyond_rounding(sweep, i, part) for i, part in enumerate(ordered)]
 
 
-def _solved(exact: ExactPencil, bracket: Bracket, mechanisms: int) -> tuple[float, float]:
-    """Return the zero in a bracket, by a bracketed secant on exact values, and the root there."""
+@dataclass(frozen=True)
+class _Solved:
+    """Where something passes through zero: the friction, and the root or middle of the pair there."""
+
+    friction: float
+    centre: float
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """The frictions below and above at which verdicts are proved."""
+        return self.friction - SIDE * abs(self.friction), self.friction + SIDE * abs(self.friction)
+
+
+def _solved(exact: ExactPencil, bracket: Bracket, mechanisms: int) -> _Solved:
+    """Return the zero in a bracket: where two roots coalesce by Newton's method, if that stays in it."""
     (x0, x1), (f0, f1), (c0, c1) = bracket.friction, bracket.values, bracket.centre
     if abs(sum(bracket.change)) > 1:
-        return float((x0 + x1) / 2), float(c0)
+        return _Solved(float((x0 + x1) / 2), float(c0))
+    if bracket.change[0] and f0 * f1 < 0:
+        t = float(f0 / (f0 - f1))
+        found = coalescence(exact, float(x0 + (x1 - x0) * t), float(c0 + (c1 - c0) * t))
+        if found is not None and x0 < found[0] < x1:
+            return _Solved(found[0], scaled(found[1], exact.exponent))
+    return _Solved(*_bracketed(exact, bracket, mechanisms))
+
+
+def _bracketed(exact: ExactPencil, bracket: Bracket, mechanisms: int) -> tuple[float, float]:
+    """Return the zero in a bracket, by a bracketed secant on exact values, and the root there."""
+    (x0, x1), (f0, f1), (c0, c1) = bracket.friction, bracket.values, bracket.centre
 
     def value(x: float, centre: float, gap: float) -> tuple[float, float]:
         if bracket.change[0]:
@@ -109,6 +134,8 @@ def _solved(exact: ExactPencil, bracket: Bracket, mechanisms: int) -> tuple[floa
         # An end of the bracket may be the boundary itself.
         if f == 0:
             return float(x), float(centre)
+    if np.isnan([f0, f1]).any():
+        return float((x0 + x1) / 2), float(c0)
     x, centre = float(x0), float(c0)
     for _ in range(100):
         last = x
@@ -131,7 +158,7 @@ def _solved(exact: ExactPencil, bracket: Bracket, mechanisms: int) -> tuple[floa
 def _approximations(sweep: Sweep, row: Rows, friction: Array) -> Complex:
     """Return approximations of all roots, mechanisms too, (N, n)."""
     matrices = sweep.matrices(row, friction)
-    values: Complex = np.linalg.eigvals(matrices).astype(np.complex128)
+    values = eigenvalues(matrices)
     sizes = sweep.sizes[row]
     for size in np.unique(sizes[sizes > 0]):
         same = np.flatnonzero(sizes == size)
@@ -139,55 +166,40 @@ def _approximations(sweep: Sweep, row: Rows, friction: Array) -> Complex:
     return values
 
 
-def _flutter(
-    sweep: Sweep,
-    exact: ExactPencil,
-    bracket: Bracket,
-    solved: tuple[float, float],
-    sides: Array,
-    near: Complex,
-) -> Boundary:
+def _flutter(sweep: Sweep, exact: ExactPencil, bracket: Bracket, solved: _Solved, near: Complex) -> Boundary:
     """Return the boundary at which a pair of roots coalesces or parts, with what is proved of it."""
-    friction, centre = solved
     m = int(sweep.mechanisms[bracket.row])
+    rest = near[np.argsort(np.abs(near), kind="stable")[m:]]
+    rest = np.delete(rest, np.argsort(np.abs(rest - solved.centre), kind="stable")[:2])
     counts: list[int | None] = []
     mode = 0
-    for side, start in zip(sides, near, strict=True):
+    for side in solved.sides:
+        polynomial = exact.at(side)
         # The pair itself from its exact squared gap: approximations of it are not good enough.
-        gap, middle = exact_gap(exact, float(side), centre, 0.0)
-        if np.isnan(gap):
-            counts.append(None)
-            continue
-        rest = start[np.argsort(np.abs(start), kind="stable")[m:]]
-        rest = np.delete(rest, np.argsort(np.abs(rest - middle), kind="stable")[:2])
+        gap, middle = gap_about(polynomial, whole(solved.centre, exact.exponent), exact.exponent)
         half = np.sqrt(complex(gap)) / 2
         roots = np.concatenate([np.zeros(m), rest, [middle + half, middle - half]])
-        values = certify_polynomial(exact.at(float(side)), exact.exponent, roots, m, sweep.norm[bracket.row])
+        values = certify_polynomial(polynomial, exact.exponent, roots, m, sweep.norm[bracket.row])
         counts.append(None if values is None else int((values.imag > 0).sum()))
         if gap < 0:
             frequencies = np.sqrt(roots).real
             mode = int((frequencies < frequencies[-1]).sum()) + 2
     certified = None not in counts and counts[1] == (counts[0] or 0) + bracket.change[0]
-    frequency = float(np.sqrt(max(centre, 0.0)) / (2 * np.pi))
-    return Boundary(friction, sum(bracket.change), mode, frequency, certified)
+    frequency = float(np.sqrt(max(solved.centre, 0.0)) / (2 * np.pi))
+    return Boundary(solved.friction, sum(bracket.change), mode, frequency, certified)
 
 
 def _divergence(
-    sweep: Sweep,
-    exact: ExactPencil,
-    bracket: Bracket,
-    solved: tuple[float, float],
-    sides: Array,
-    near: Complex,
+    sweep: Sweep, exact: ExactPencil, bracket: Bracket, solved: _Solved, near: Complex
 ) -> Boundary:
     """Return the boundary at which a real root passes through zero.
 
     Proved by the sign of the determinant on both sides, which mechanisms would make zero.
     """
     m = int(sweep.mechanisms[bracket.row])
-    signs = [int(exact.at(float(side))[0]) > 0 for side in sides]
+    signs = [int(exact.at(side)[0]) > 0 for side in solved.sides]
     certified = m == 0 and abs(bracket.change[1]) == 1 and signs[0] != signs[1]
-    return Boundary(solved[0], bracket.change[1], m + 1, 0.0, certified)
+    return Boundary(solved.friction, bracket.change[1], m + 1, 0.0, certified)
 
 
 def _differs(sweep: Sweep, exact: ExactPencil, bracket: Bracket) -> bool:
@@ -242,7 +254,7 @@ def _within_rounding(sweep: Sweep, row: int, group: list[Boundary]) -> bool:
         return False
     friction = np.linspace(group[0].friction, group[-1].friction, 17)
     matrices = sweep.matrices(np.full(17, row), friction)
-    values, radius = structured_eigenvalues(matrices, np.linalg.eigvals(matrices).astype(complex), size)
+    values, radius = structured_eigenvalues(matrices, eigenvalues(matrices), size)
     near = np.abs(values - (2 * np.pi * group[0].frequency) ** 2)
     if group[0].direction > 0:
         # Only the pairs of the window: others are far from the axis at both its ends too.

@@ -8,6 +8,7 @@ a stable one.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -16,8 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hipuq.cea.boundary import Boundary, inside
+from hipuq.cea.bounds import NEVER
 from hipuq.cea.damped_onset import damped_boundaries
 from hipuq.cea.onset import check_range, search
+from hipuq.cea.overtaking import Change, located
 from hipuq.cea.pencils import Array, Pencils
 from hipuq.cea.spectrum import solve
 from hipuq.errors import InputError
@@ -33,6 +36,9 @@ LOOKS = 9
 
 LOOKS_BY_MODE = 33
 """The same where modes are told apart: one that overtakes another twice between two of them is not seen."""
+
+SURE = 3
+"""Of those every so manieth is solved with its bounds, others where plain eigenvalues differ from it."""
 
 FINEST = 1e-10
 """Width to which an overtaking is located, as part of the range."""
@@ -111,8 +117,7 @@ def stability_cells(
     start, end = (np.concatenate([own[part] for own in edges]) for part in (slice(-1), slice(1, None)))
     looks = _looks(LOOKS_BY_MODE if by_mode else LOOKS)
     friction = start[:, None] + (end - start)[:, None] * looks
-    unstable = _unstable(pencils, np.repeat(row, len(looks)), friction.ravel(), growth_threshold)
-    unstable = unstable.reshape(*friction.shape, -1)
+    unstable = _looked(pencils, row, friction, growth_threshold, by_mode)
     fits = np.zeros(friction.shape, bool)
     for i, own in enumerate(found):
         if own is not None:
@@ -197,14 +202,61 @@ def _looks(count: int) -> Array:
     return places
 
 
-def _unstable(pencils: Pencils, row: Rows, friction: Array, growth_threshold: float) -> Array:
-    """Return which modes of samples are unstable at frictions, (N, n); NaN where not known."""
-    made = np.empty((len(row), pencils.stiffness.shape[1]))
+def _looked(pencils: Pencils, row: Rows, friction: Array, growth_threshold: float, by_mode: bool) -> Array:
+    """Return which modes are unstable at the looks of cells, (cells, looks, n); NaN where not known."""
+    places = np.arange(friction.shape[1])
+    sure = places % SURE == 1 if by_mode else np.ones(len(places), bool)
+    rows = np.repeat(row[:, None], len(places), axis=1)
+    made = np.full((*friction.shape, pencils.stiffness.shape[1]), np.nan)
+    made[:, sure] = _seen(pencils, rows[:, sure], friction[:, sure], growth_threshold)[0]
+    if sure.all():
+        return made
+    count = np.nan_to_num(np.fmax.reduce(made[:, sure].sum(axis=2), axis=1))
+    some = count > 0
+    guess = np.zeros((len(row), (~sure).sum(), made.shape[2]))
+    guess[some] = _guessed(
+        pencils, rows[:, ~sure][some], friction[:, ~sure][some], growth_threshold, count[some]
+    )
+    last = np.searchsorted(places[sure], places[~sure])
+    same = np.ones(guess.shape[:2], bool)
+    for beside in (last - 1, last):
+        same &= (guess == made[:, sure][:, beside.clip(0, sure.sum() - 1)]).all(axis=2)
+    guess[~same] = _seen(pencils, rows[:, ~sure][~same], friction[:, ~sure][~same], growth_threshold)[0]
+    made[:, ~sure] = guess
+    return made
+
+
+def _seen(pencils: Pencils, row: Rows, friction: Array, growth_threshold: float) -> tuple[Array, Array]:
+    """Return which modes of samples are unstable at frictions, NaN where not known, and frequencies [Hz].
+
+    Both of the shape of the frictions and one more axis, (..., n).
+    """
+    n = pencils.stiffness.shape[1]
+    unstable, frequency = np.empty((friction.size, n)), np.empty((friction.size, n))
+    for part, own in _blocks(pencils, row, friction):
+        spectra = solve(own, growth_threshold=growth_threshold)
+        unstable[part], frequency[part] = spectra.unstable, spectra.frequency
+    return unstable.reshape(*friction.shape, n), frequency.reshape(*friction.shape, n)
+
+
+def _guessed(pencils: Pencils, row: Rows, friction: Array, growth_threshold: float, count: Array) -> Array:
+    """Return the modes that grow fastest in cells, as many as are unstable, by plain eigenvalues."""
+    growth = np.empty((friction.size, pencils.stiffness.shape[1]))
+    # Every eigenvalue is taken for what it looks like.
+    plain = replace(pencils, filter_radius=float(np.finfo(np.float64).tiny))
+    for part, own in _blocks(plain, row, friction):
+        growth[part] = solve(own, growth_threshold=growth_threshold, certify=NEVER).growth_rate
+    growth = growth.reshape(*friction.shape, growth.shape[1])
+    rank = np.argsort(np.argsort(-growth, axis=2, kind="stable"), axis=2)
+    return np.asarray(rank < count[:, None, None], np.float64)
+
+
+def _blocks(pencils: Pencils, row: Rows, friction: Array) -> Iterator[tuple[slice, Pencils]]:
+    """Give the pencils of samples at frictions in blocks."""
+    row, friction = row.ravel(), friction.ravel()
     for start in range(0, len(row), BLOCK):
         part = slice(start, start + BLOCK)
-        own = replace(pencils.rows(row[part]), friction=friction[part])
-        made[part] = solve(own, growth_threshold=growth_threshold).unstable
-    return made
+        yield part, replace(pencils.rows(row[part]), friction=friction[part])
 
 
 def _fitting(count: Array, found: tuple[Boundary, ...]) -> Mask:
@@ -222,28 +274,16 @@ def _pieces(
     row: int, start: float, friction: Array, unstable: Array, fits: Mask, by_mode: bool
 ) -> list[_Piece]:
     """Return the parts of a cell in which its looks show the same modes unstable."""
-    pieces: list[_Piece] = []
-    for x, own in zip(friction[fits], unstable[fits], strict=True):
-        if pieces and (not by_mode or np.array_equal(pieces[-1].unstable, own)):
-            pieces[-1] = replace(pieces[-1], last=x)
-        else:
-            pieces.append(_Piece(row, start if not pieces else x, x, x, float(own.sum()), own))
     # A verdict that contradicts the boundaries shows that one was missed: then nothing is known.
-    if not pieces or not (fits | np.isnan(unstable).any(axis=1)).all():
+    if not fits.any() or not (fits | np.isnan(unstable).any(axis=1)).all():
         return [_Piece(row, start, start, start, np.nan, np.full(unstable.shape[1], np.nan))]
-    return pieces
-
-
-@dataclass
-class _Change:
-    """Two frictions in a cell with different modes unstable; where they change is halved down to."""
-
-    cell: int
-    low: float
-    high: float
-    below: Array
-    above: Array
-    known: bool = True
+    x, shown = friction[fits], unstable[fits]
+    changes = np.flatnonzero((shown[1:] != shown[:-1]).any(axis=1)) + 1 if by_mode else np.empty(0, np.intp)
+    count = float(shown[0].sum())
+    return [
+        _Piece(row, start if first == 0 else float(x[first]), float(x[first]), float(x[end - 1]), count, own)
+        for first, end, own in zip([0, *changes], [*changes, len(x)], shown[[0, *changes]], strict=True)
+    ]
 
 
 def _locate(pencils: Pencils, pieces: list[list[_Piece]], growth_threshold: float, finest: float) -> None:
@@ -252,35 +292,21 @@ def _locate(pencils: Pencils, pieces: list[list[_Piece]], growth_threshold: floa
     What lies between two looks that cannot be told becomes a piece of which the number of unstable modes
     is known, but not which.
     """
+
+    def look(cells: list[int], friction: Array) -> tuple[Array, Array]:
+        return _seen(pencils, np.array([pieces[k][0].row for k in cells]), friction, growth_threshold)
+
     changes = [
-        _Change(k, a.last, b.first, a.unstable, b.unstable)
+        Change(k, [a.last, b.first], [a.unstable, b.unstable])
         for k, own in enumerate(pieces)
         for a, b in pairwise(own)
     ]
-    while True:
-        open_ = [one for one in changes if one.known and one.high - one.low > finest]
-        if not open_:
-            break
-        row = np.array([pieces[one.cell][0].row for one in open_])
-        middles = np.array([(one.low + one.high) / 2 for one in open_])
-        found = _unstable(pencils, row, middles, growth_threshold)
-        for one, x, seen in zip(open_, middles.tolist(), found, strict=True):
-            if np.array_equal(seen, one.below):
-                one.low = x
-            elif np.array_equal(seen, one.above):
-                one.high = x
-            elif seen.sum() == one.below.sum():
-                changes.append(_Change(one.cell, x, one.high, seen, one.above))
-                one.high, one.above = x, seen
-            else:
-                one.known = False
     for k in {one.cell for one in changes}:
-        first = pieces[k][0]
-        pieces[k] = [first]
-        for one in sorted((one for one in changes if one.cell == k), key=lambda one: one.low):
-            if one.known:
-                middle = (one.low + one.high) / 2
-                pieces[k].append(replace(first, start=middle, unstable=one.above))
-            else:
-                pieces[k].append(replace(first, start=one.low, unstable=np.full_like(one.above, np.nan)))
-                pieces[k].append(replace(first, start=one.high, unstable=one.above))
+        del pieces[k][1:]
+    for one in located(changes, look, finest):
+        own, (low, high), above = pieces[one.cell], one.ends, one.shown[1]
+        if one.known:
+            own.append(replace(own[0], start=(low + high) / 2, unstable=above))
+        else:
+            own.append(replace(own[0], start=low, unstable=np.full_like(above, np.nan)))
+            own.append(replace(own[0], start=high, unstable=above))

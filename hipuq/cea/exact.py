@@ -18,6 +18,9 @@ from hipuq.cea.pencils import Array
 MOST_STEPS = 30
 """Steps after which the iteration for a pair of roots is given up."""
 
+HALF = 40
+"""Bits of a root to which the last step of Newton's method agrees with the one before: it squares errors."""
+
 FINE = 40
 """Bits of a squared gap, in units of the root, from which whole numbers resolve it well."""
 
@@ -45,23 +48,110 @@ class ExactPencil:
 
         self.n = n = len(constant)
         whole, self.exponent = integers(np.stack([constant, slope]))
-        zero, one = fmpz_mat(n, n, whole[: n * n]), fmpz_mat(n, n, whole[n * n :])
         self.bits = max(abs(a) for a in whole).bit_length()
+        # Short entries make the polynomials quick; the unit of the roots is put in afterwards.
+        short, spare = stripped(whole)
+        zero, one = fmpz_mat(n, n, short[: n * n]), fmpz_mat(n, n, short[n * n :])
         self.degree = one.rank()
         values = [(zero + t * one).charpoly().coeffs() for t in range(self.degree + 1)]
-        samples = fmpz_mat(self.degree + 1, n + 1, [c for p in values for c in p])
+        scaled = [c << spare * (n - k) for p in values for k, c in enumerate(p)]
+        samples = fmpz_mat(self.degree + 1, n + 1, scaled)
         # Row k: coefficients of w**k as a polynomial in mu, times a common denominator.
         self._rows = (_vandermonde_inverse(self.degree) * samples).transpose()
 
     def at(self, mu: float) -> Any:
         """Return an integer multiple of the characteristic polynomial in w / 2**exponent, fmpz_poly."""
-        from flint import fmpz, fmpz_mat, fmpz_poly
+        return self._combined(self._powers(mu))
+
+    def at_with_slope(self, mu: float) -> tuple[Any, Any]:
+        """Return the polynomial as `at` does and its derivative by mu, times the same number."""
+        powers = self._powers(mu)
+        rising = [0, *(j * powers[j - 1] for j in range(1, self.degree + 1))]
+        return self._combined(powers), self._combined(rising)
+
+    def _powers(self, mu: float) -> list[Any]:
+        """Return the powers of mu, times a common power of two."""
+        from flint import fmpz
 
         top, bottom = mu.as_integer_ratio()
         down = bottom.bit_length() - 1
-        powers = [fmpz(top) ** j << down * (self.degree - j) for j in range(self.degree + 1)]
-        made = self._rows * fmpz_mat(self.degree + 1, 1, powers)
-        return fmpz_poly([made[k, 0] for k in range(self.n + 1)])
+        return [fmpz(top) ** j << down * (self.degree - j) for j in range(self.degree + 1)]
+
+    def _combined(self, weights: list[Any]) -> Any:
+        """Return the polynomial in w whose coefficients are sums over those in mu, fmpz_poly."""
+        from flint import fmpz_mat, fmpz_poly
+
+        made = self._rows * fmpz_mat(self.degree + 1, 1, weights)
+        return fmpz_poly(made.entries())
+
+
+def stripped(whole: list[int]) -> tuple[list[int], int]:
+    """Return whole numbers without the power of two that is common to all, and its exponent."""
+    together = 0
+    for a in whole:
+        together |= a
+    spare = max(0, (together & -together).bit_length() - 1)
+    return [a >> spare for a in whole], spare
+
+
+def coalescence(exact: ExactPencil, friction: float, centre: float) -> tuple[float, int] | None:
+    """Return the friction at which two roots coalesce, and the double root, by Newton's method.
+
+    Between the two roots p has an extremum w in w, and its value there vanishes with their gap. By mu that
+    value changes as dp / dmu at w does, so each step needs p at one friction.
+
+    Parameters
+    ----------
+    exact : ExactPencil
+    friction : float
+        Approximation [1].
+    centre : float
+        Approximate double root [1/s^2].
+
+    Returns
+    -------
+    friction : float
+        To the last digits of a double [1].
+    root : int
+        Over 2**exponent, the extremum at that friction.
+
+    None if the steps do not become small.
+    """
+    w = whole(centre, exact.exponent)
+    first_step = math.inf
+    for _ in range(MOST_STEPS):
+        p, by_mu = exact.at_with_slope(friction)
+        found = _extremum(p, w)
+        if found is None:
+            return None
+        w = found
+        slope = int(by_mu(w))
+        if slope == 0:
+            return None
+        step = -_ratio(int(p(w)), slope, 0)
+        friction += step
+        if abs(step) <= 1e-15 * abs(friction):
+            return friction, w
+        if abs(step) > 2 * first_step:
+            return None
+        first_step = min(first_step, abs(step))
+    return None
+
+
+def _extremum(p: Any, w: int) -> int | None:
+    """Return the extremum of a polynomial near w by Newton's method in whole numbers, or None."""
+    first = p.derivative()
+    second = first.derivative()
+    for _ in range(MOST_STEPS):
+        curvature = int(second(w))
+        if curvature == 0:
+            return None
+        step = int(first(w)) // curvature
+        w -= step
+        # From there on the next step would be below the last bit of a double.
+        if abs(step) <= max(1, abs(w) >> HALF):
+            return w
+    return None
 
 
 def exact_gap(exact: ExactPencil, friction: float, centre: float, gap: float) -> tuple[float, float]:
@@ -104,12 +194,12 @@ def exact_gap(exact: ExactPencil, friction: float, centre: float, gap: float) ->
         if abs(ds) <= 2:
             found = s * s - 4 * q
             if abs(found).bit_length() < s.bit_length() + FINE:
-                return _gap_about(p, s // 2, exact.exponent)
+                return gap_about(p, s // 2, exact.exponent)
             return scaled(found, 2 * exact.exponent), scaled(s, exact.exponent - 1)
     return math.nan, centre
 
 
-def _gap_about(p: Any, w: int, exponent: int) -> tuple[float, float]:
+def gap_about(p: Any, w: int, exponent: int) -> tuple[float, float]:
     """Return squared gap and middle of a pair of roots so close that whole numbers do not resolve it.
 
     About the extremum of p between the roots p is p'' / 2 ((w - m)^2 - gap^2 / 4) up to third order.
@@ -141,6 +231,12 @@ def scaled(number: int, exponent: int) -> float:
     """Return number * 2**exponent, rounded, also where the number is beyond the range of doubles."""
     drop = max(0, number.bit_length() - 64)
     return math.ldexp(float(number >> drop), drop + exponent)
+
+
+def log2(number: int) -> float:
+    """Return log2 |number|, also where the number is beyond the range of doubles."""
+    drop = max(0, number.bit_length() - 500)
+    return math.log2(abs(number) >> drop) + drop if number else -math.inf
 
 
 def integers(values: Array) -> tuple[list[int], int]:

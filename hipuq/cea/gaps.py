@@ -41,6 +41,16 @@ ISOLATED = 3.0
 """Distance of other roots from a merging pair, over half its gap and its way, from which they are apart."""
 
 
+REACH = 0.04
+"""How far from the minimum of a gap an interval is cut on both sides, as part of half its width."""
+
+WIDEST = 0.1
+"""The same at most where it is known how far the roots are from crossing in straight lines."""
+
+MARGIN = 1.5
+"""How much farther than it need be."""
+
+
 @dataclass(frozen=True)
 class Bracket:
     """An interval of friction in which something passes through zero once.
@@ -67,7 +77,7 @@ class Bracket:
     centre: Array
 
 
-def vanishing(points: Triple) -> tuple[Mask, Array]:
+def vanishing(points: Triple) -> tuple[Mask, Array, Array]:
     """Say which intervals may hold a zero of a squared gap, though no count differs at their points.
 
     A gap that stays well above its second difference, or whose square does, does not vanish: the gap
@@ -85,6 +95,8 @@ def vanishing(points: Triple) -> tuple[Mask, Array]:
     vertex : (N,) array
         Friction at which the least squared gap has its minimum, by the parabola through its three
         values; NaN where that is not inside the interval.
+    reach : (N,) array
+        How far from there the interval is best cut [1], see `_cut`.
     """
     a, m, b = points
     width = (b.friction - a.friction)[:, None]
@@ -111,9 +123,47 @@ def vanishing(points: Triple) -> tuple[Mask, Array]:
         low, t = np.full((len(low), 1), np.inf), np.zeros((len(low), 1))
     k = np.argmin(low, axis=1)
     rows = np.arange(len(k))
-    vertex = np.where(np.isfinite(low[rows, k]), m.friction + t[rows, k] * width[:, 0] / 2, np.nan)
+    if gap.shape[2]:
+        place, reach = _cut(gap[:, rows, k], t[rows, k], factor[:, 0])
+    else:
+        place, reach = np.zeros((2, len(low)))
+    half = width[:, 0] / 2
+    vertex = np.where(np.isfinite(low[rows, k]), m.friction + place * half, np.nan)
     sure += [_stays(part, factor) | _stays(np.square(part), factor) for part in _differences(every)]
-    return ~(clear.all(axis=1) & np.all(np.concatenate(sure, axis=1), axis=1)), vertex
+    return ~(clear.all(axis=1) & np.all(np.concatenate(sure, axis=1), axis=1)), vertex, reach * half
+
+
+def _cut(gap: Array, vertex: Array, factor: Array) -> tuple[Array, Array]:
+    """Return where two roots are nearest to each other, and how far from there their gap is clear again.
+
+    Roots that cross without coupling have a gap with a sign that changes there, and nearly straight. Cut so
+    far from its zero that it exceeds `factor` times the second difference that it has on the longer side,
+    the rest of the interval needs no more cuts.
+
+    Parameters
+    ----------
+    gap : (3, N) array
+        At the ends and the middle of the interval, from -1 to 1.
+    vertex : (N,) array
+        Minimum of its square, by a parabola.
+    factor : (N,) array
+
+    Returns
+    -------
+    place, reach : (N,) array
+    """
+    a, m, b = gap
+    bends = np.stack([a + 2 * m - b, a - 2 * m - b])
+    late = np.abs(bends[1]) < np.abs(bends[0])
+    bend, middle = np.where(late, bends[1], bends[0]), np.where(late, m, -m)
+    slope = -(a + b) / 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        place = -middle / slope
+        place = -(middle + bend / 2 * np.square(place)) / slope
+        length = 1 + np.abs(place)
+        reach = MARGIN * factor * np.abs(bend / slope) * np.square(length) / 4
+        straight = (np.abs(bend) < STRAIGHT * np.abs(slope)) & (np.abs(place) < 1)
+    return np.where(straight, place, vertex), np.where(straight, np.minimum(reach, WIDEST), REACH)
 
 
 def _packed(real: Array, pairs: Complex) -> Complex:
@@ -182,7 +232,7 @@ def crossing(points: Triple) -> tuple[list[Bracket | None], Array]:
     bend = np.abs(values[0] - 2 * values[1] + values[2])
     with np.errstate(invalid="ignore"):
         single = bend <= STRAIGHT * np.abs(values[2] - values[0])
-    open_, _ = vanishing((rest[0], rest[1], rest[2]))
+    open_, _, _ = vanishing((rest[0], rest[1], rest[2]))
     single &= ~open_
     zero = np.full(len(single), np.nan)
     found: list[Bracket | None] = [None] * len(single)
@@ -229,9 +279,14 @@ def _merged(points: Triple, rest: list[Points], counts: NDArray[np.intp], i: int
     values, centre = np.empty(3), np.empty(3)
     few = counts.min()
     below, above = (next(j for j in range(3) if (counts[j] == few) == low) for low in (True, False))
+    places: dict[tuple[int, int], tuple[int, int]] = {}
     for j, point in enumerate(points):
-        one, two = (points[j if counts[j] == few else below], points[j if counts[j] != few else above])
-        k, pair = merging(one.real[i], one.pairs[i], two.real[i], two.pairs[i])
+        # Of the point itself and the nearest one on the other side of the crossing.
+        both = (j, above) if counts[j] == few else (below, j)
+        if both not in places:
+            one, two = points[both[0]], points[both[1]]
+            places[both] = merging(one.real[i], one.pairs[i], two.real[i], two.pairs[i])
+        k, pair = places[both]
         if counts[j] == few:
             x, y = point.real[i, k : k + 2]
             values[j], centre[j] = (y - x) ** 2, (x + y) / 2

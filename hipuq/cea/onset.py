@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hipuq.cea.boundary import Boundary, inside, proved
-from hipuq.cea.gaps import NARROWEST, PARABOLIC, Bracket, Mask, Triple, crossing, unresolved, vanishing
+from hipuq.cea.gaps import NARROWEST, PARABOLIC, REACH, Bracket, Mask, Triple, crossing, unresolved, vanishing
 from hipuq.cea.pencils import Array, Pencils
-from hipuq.cea.points import Points, Rows, Sweep
+from hipuq.cea.points import Points, Rows, Sweep, interpolated
 from hipuq.errors import InputError
 
 MOST = 1000
@@ -25,9 +25,6 @@ MOST = 1000
 
 CROWDED = 1e-4
 """See `MOST`. Parts nearer to each other than this are left as one."""
-
-REACH = 0.02
-"""How far from the minimum of a gap an interval is cut on both sides, as part of its width."""
 
 GRID = 17
 """Frictions at which every pencil is looked at first."""
@@ -136,10 +133,11 @@ def _brackets(sweep: Sweep, lower: float, upper: float) -> tuple[list[Bracket], 
     left: list[list[tuple[float, float]]] = [[] for _ in range(samples)]
     while todo.size:
         a, b = points.take(todo[0]), points.take(todo[1])
-        m = sweep.points(a.row, (a.friction + b.friction) / 2)
+        centre = (a.friction + b.friction) / 2
+        m = sweep.points(a.row, centre, interpolated(a, b, centre))
         middle = len(points.row) + np.arange(len(m.row))
         points += m
-        open_, vertex, brackets = _judged((a, m, b))
+        open_, vertex, reach, brackets = _judged((a, m, b))
         found += brackets
         crowd = np.bincount(a.row[open_], minlength=samples)[a.row] > MOST
         for i in np.flatnonzero(open_ & crowd & (b.friction - a.friction < CROWDED)):
@@ -150,13 +148,15 @@ def _brackets(sweep: Sweep, lower: float, upper: float) -> tuple[list[Bracket], 
         # Where the gap has a minimum: a narrow interval about it, and what is left on both sides. It
         # is put such that none of its points is the minimum, where two roots may be one.
         thirds = np.flatnonzero(open_ & ~np.isnan(vertex))
-        reach = np.maximum(REACH * (b.friction - a.friction), PARABOLIC / 4)[thirds]
+        reach = np.maximum(reach, PARABOLIC / 5)[thirds]
         below = np.maximum(vertex[thirds] - 3 * reach, a.friction[thirds])
         above = np.minimum(vertex[thirds] + reach, b.friction[thirds])
-        cuts = sweep.points(np.tile(a.row[thirds], 2), np.concatenate([below, above]))
-        low, high = len(points.row) + np.arange(2 * len(thirds)).reshape(2, -1)
+        low, high = (part.take(np.tile(thirds, 2)) for part in (a, b))
+        cut = np.concatenate([below, above])
+        cuts = sweep.points(low.row, cut, interpolated(low, high, cut))
+        first, second = len(points.row) + np.arange(2 * len(thirds)).reshape(2, -1)
         points += cuts
-        parts += [[todo[0, thirds], low], [low, high], [high, todo[1, thirds]]]
+        parts += [[todo[0, thirds], first], [first, second], [second, todo[1, thirds]]]
         todo = np.concatenate([np.stack(part) for part in parts], axis=1)
         todo = todo[:, points.friction[todo[0]] < points.friction[todo[1]]]
     return found, [_joined(parts) for parts in left]
@@ -173,15 +173,15 @@ def _joined(parts: list[tuple[float, float]]) -> Array:
     return np.array(made, dtype=np.float64).reshape(-1, 2)
 
 
-def _judged(points: Triple) -> tuple[Mask, Array, list[Bracket]]:
-    """Return which intervals must be divided, where their gap is least or zero, and the brackets found."""
+def _judged(points: Triple) -> tuple[Mask, Array, Array, list[Bracket]]:
+    """Return which intervals must be divided, where and how near a gap is least or zero, and the brackets."""
     a, m, b = points
     width = b.friction - a.friction
     even = _same(a, m) & _same(a, b)
-    vertex = np.full(len(width), np.nan)
+    vertex, reach = np.full(len(width), np.nan), REACH * width / 2
     open_ = np.ones(len(width), bool)
     rows = np.flatnonzero(even)
-    open_[rows], vertex[rows] = vanishing(_take(points, rows))
+    open_[rows], vertex[rows], reach[rows] = vanishing(_take(points, rows))
     rows = np.flatnonzero(~even)
     found = []
     crossings, vertex[rows] = crossing(_take(points, rows))
@@ -192,7 +192,7 @@ def _judged(points: Triple) -> tuple[Mask, Array, list[Bracket]]:
         elif width[i] <= NARROWEST and not _same(a, b)[i]:
             found.append(unresolved(points, int(i)))
     vertex[width <= PARABOLIC] = np.nan
-    return open_ & (width > NARROWEST), vertex, found
+    return open_ & (width > NARROWEST), vertex, reach, found
 
 
 def _same(a: Points, b: Points) -> Mask:

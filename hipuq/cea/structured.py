@@ -9,6 +9,8 @@ J. Matrix Anal. Appl. 27 (2005) 153, for the tridiagonal case).
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,18 +18,11 @@ from hipuq.cea.bounds import EPS, Complex
 from hipuq.cea.pencils import Array
 
 Rows = NDArray[np.intp]
+Numbers = NDArray[Any]
+"""Real or complex numbers: where all are real that is cheaper."""
 
 MAXIMUM_STEPS = 60
 """Steps after which a root that still moves is taken as not found."""
-
-ROUGH_STEPS = 20
-"""Steps after which a rough solution is left as it is."""
-
-ROUGH_TRACE = 1e-7
-"""Error of the sum of a rough solution, over the largest root, that does not speak against it."""
-
-ROUGH = 200
-"""Correction, in units of the rounding of the largest root, with which a rough solution is content."""
 
 SAFETY = 100.0
 """Factor on the first-order bound eps * structured condition number, for the rounding in n block
@@ -64,7 +59,6 @@ def structured_eigenvalues(
     start: Complex,
     b: int,
     fixed: NDArray[np.bool_] | None = None,
-    rough: bool = False,
 ) -> tuple[Complex, Array]:
     """Return the eigenvalues of block tridiagonal matrices and their error bounds.
 
@@ -78,9 +72,6 @@ def structured_eigenvalues(
     fixed : (s, n) array of bool, optional
         Approximations that are roots as they are and not to be moved, such as those of mechanisms, to
         which the iteration would converge slowly. Their bound is 0.
-    rough : bool
-        Be content with roots that still move after ROUGH_STEPS, as they do by about their accuracy
-        where several nearly meet. Their bound, from the last step, is an estimate.
 
     Returns
     -------
@@ -100,11 +91,11 @@ def structured_eigenvalues(
     moving = np.ones(start.shape, bool) if fixed is None else ~fixed
     values = start + np.where(moving, 1e-9 * scale * golden, 0.0)
     step = np.where(moving, np.inf, 0.0)
-    blocks = _Blocks(matrices, b)
+    blocks = Blocks(matrices, b)
     row, root = np.nonzero(moving)
     own = blocks.rows(row)
     with np.errstate(all="ignore"):
-        for _ in range(ROUGH_STEPS if rough else MAXIMUM_STEPS):
+        for _ in range(MAXIMUM_STEPS):
             still = moving[row, root]
             if not still.any():
                 break
@@ -117,36 +108,23 @@ def structured_eigenvalues(
             values[row, root] -= delta
             # Corrections of rounding size no longer shrink: the attainable accuracy is reached.
             fine = EPS * scale[row, 0]
-            settled = (size <= (ROUGH if rough else 4) * fine) | (
-                (size <= 128 * fine) & (size >= 0.5 * step[row, root])
-            )
+            settled = (size <= 4 * fine) | ((size <= 128 * fine) & (size >= 0.5 * step[row, root]))
             step[row, root] = np.where(moving[row, root], size, step[row, root])
             moving[row, root] &= ~settled
-        # What a rough solution needs bounds for is whether roots near the axis are real.
-        near = (np.abs(values.imag) < 1e-6 * scale) & (np.abs(values.imag) > SAFETY * EPS * scale)
-        row, root = np.nonzero(near if rough else np.ones_like(moving))
-        condition = np.broadcast_to(scale, values.shape).copy()
-        if row.size:
-            found = _structured_condition(blocks.rows(row), values, row, root)
-            # A root of which no condition number can be had is as good as double.
-            condition[row, root] = (
-                np.nan_to_num(found, nan=1e-6 / EPS / SAFETY * scale[row, 0]) if rough else found
-            )
+        row, root = np.nonzero(np.ones_like(moving))
+        condition = structured_condition(blocks.rows(row), values, row, root).reshape(values.shape)
         radius = SAFETY * EPS * np.maximum(condition, scale)
         radius += 0.5 * n * step
     if fixed is not None:
         radius[fixed] = 0.0
-    radius[~np.isfinite(radius) | (moving & (not rough))] = np.inf
+    radius[~np.isfinite(radius) | moving] = np.inf
     # Two approximations of one root would leave another root out, and the trace wrong.
     stray = np.abs(values.sum(axis=1) - np.trace(matrices, axis1=1, axis2=2))
-    if rough:
-        # Roots that were fixed are as good as they were given.
-        stray -= ROUGH_TRACE * scale[:, 0]
     radius[stray > radius.sum(axis=1)] = np.inf
     return _real_where_sure(values, radius), radius
 
 
-class _Blocks:
+class Blocks:
     """Block diagonals of a batch, (count, b, b, s) each: long loops over the samples are fast."""
 
     def __init__(self, matrices: Array, b: int) -> None:
@@ -154,13 +132,13 @@ class _Blocks:
         self.count = n // b
         tiles = matrices.reshape(s, self.count, b, self.count, b).transpose(1, 3, 2, 4, 0)
         index = np.arange(self.count)
-        self.diagonal = tiles[index, index].astype(np.complex128)
-        self.lower = tiles[index[1:], index[:-1]].astype(np.complex128)
-        self.upper = tiles[index[:-1], index[1:]].astype(np.complex128)
+        self.diagonal = tiles[index, index].copy()
+        self.lower = tiles[index[1:], index[:-1]].copy()
+        self.upper = tiles[index[:-1], index[1:]].copy()
 
-    def rows(self, rows: NDArray[np.intp]) -> _Blocks:
+    def rows(self, rows: NDArray[np.intp]) -> Blocks:
         """Return the blocks of some samples, repeated as they are."""
-        part = object.__new__(_Blocks)
+        part = object.__new__(Blocks)
         part.count = self.count
         part.diagonal, part.lower, part.upper = (
             blocks.take(rows, axis=-1) for blocks in (self.diagonal, self.lower, self.upper)
@@ -168,24 +146,25 @@ class _Blocks:
         return part
 
 
-def _times(left: Complex, right: Complex) -> Complex:
+def _times(left: Numbers, right: Numbers) -> Numbers:
     """Return the products of small matrices, (b, b, N); matmul would cost a call for each."""
-    product = left[:, :1] * right[:1]
+    product: Numbers = left[:, :1] * right[:1]
     for k in range(1, left.shape[0]):
         product += left[:, k : k + 1] * right[k : k + 1]
     return product
 
 
-def _trace_of_product(left: Complex, right: Complex) -> Complex:
+def _trace_of_product(left: Numbers, right: Numbers) -> Numbers:
     """Return the traces of products of small matrices, (N,)."""
-    return np.asarray((left * right.swapaxes(0, 1)).sum(axis=(0, 1)), dtype=np.complex128)
+    trace: Numbers = (left * right.swapaxes(0, 1)).sum(axis=(0, 1))
+    return trace
 
 
-def _inverse(matrices: Complex) -> Complex:
+def _inverse(matrices: Numbers) -> Numbers:
     """Return the inverses of small matrices, (b, b, N), not finite for singular ones."""
     b = len(matrices)
     if b == 1:
-        return np.asarray(1.0 / matrices, dtype=np.complex128)
+        return np.asarray(1.0 / matrices)
     if b == 2:
         (p, q), (r, t) = matrices
         inverse = np.empty_like(matrices)
@@ -198,25 +177,23 @@ def _inverse(matrices: Complex) -> Complex:
     except np.linalg.LinAlgError:
         singular = (np.linalg.slogdet(stack)[0] == 0)[:, None, None]
         made = np.where(singular, np.inf, np.linalg.inv(np.where(singular, np.eye(b), stack)))
-    return np.ascontiguousarray(made.transpose(1, 2, 0), dtype=np.complex128)
+    return np.ascontiguousarray(made.transpose(1, 2, 0))
 
 
-def _shifted(blocks: _Blocks, values: Complex) -> Complex:
+def _shifted(blocks: Blocks, values: Numbers) -> Numbers:
     """Return D_i - w for every block, (count, b, b, N)."""
-    shifted = blocks.diagonal.copy()
+    shifted: Numbers = blocks.diagonal.astype(values.dtype)
     index = np.arange(shifted.shape[1])
     shifted[:, index, index] -= values
     return shifted
 
 
-def _correction(blocks: _Blocks, values: Complex, row: Rows, root: Rows) -> Complex:
-    """Return the Ehrlich-Aberth corrections of some roots of values, (N,).
+def logarithmic_derivative(blocks: Blocks, at: Numbers) -> Numbers:
+    """Return the logarithmic derivative of det(A - w) by w, (N,), of N matrices, at a real or complex w each.
 
-    The logarithmic derivative of det(A - w) is the sum of tr(S_i^-1 S_i') over the pivots of the
-    block LU, S_i = D_i - w - L S_(i-1)^-1 U.
+    The sum of tr(S_i^-1 S_i') over the pivots of the block LU, S_i = D_i - w - L S_(i-1)^-1 U.
     """
-    own = values[row, root]
-    shifted = _shifted(blocks, own)
+    shifted = _shifted(blocks, at)
     b = shifted.shape[1]
     index = np.arange(b)
     derivative = np.zeros_like(shifted[0])
@@ -230,12 +207,19 @@ def _correction(blocks: _Blocks, values: Complex, row: Rows, root: Rows) -> Comp
         derivative[index, index] -= 1.0
         inverse = _inverse(shifted[i] - _times(left, blocks.upper[i - 1]))
         ratio += _trace_of_product(inverse, derivative)
+    return ratio
+
+
+def _correction(blocks: Blocks, values: Complex, row: Rows, root: Rows) -> Complex:
+    """Return the Ehrlich-Aberth corrections of some roots of values, (N,)."""
+    own = values[row, root]
     gaps = own[:, None] - values[row]
     gaps[np.arange(len(row)), root] = np.inf
+    ratio = logarithmic_derivative(blocks, own)
     return np.asarray(1.0 / (ratio - (1.0 / gaps).sum(axis=1)), dtype=np.complex128)
 
 
-def _structured_condition(blocks: _Blocks, values: Complex, row: Rows, root: Rows) -> Array:
+def structured_condition(blocks: Blocks, values: Complex, row: Rows, root: Rows) -> Array:
     """Return how far each root moves if every entry moves by its own size, (N,).
 
     Near a simple root the resolvent is x y^H / (y^H x) over the distance, so the sum of |G_jk||A_kj|

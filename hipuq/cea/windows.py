@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hipuq.cea.bounds import Complex
+from hipuq.cea.eigenvalues import eigenvalues
 from hipuq.cea.gaps import NARROWEST
 from hipuq.cea.pencils import Array
 
@@ -109,7 +110,7 @@ def _values(constant: Array, slope: Array, friction: Array, threshold: float) ->
 
     Real ones, of which there are more or fewer, count as pairs with e = 0: far from the threshold.
     """
-    squares = np.linalg.eigvals(constant + friction[:, None, None] * slope).astype(np.complex128)
+    squares = eigenvalues(constant + friction[:, None, None] * slope)
     if (squares.real <= 0).any():
         return None
     n = squares.shape[1]
