@@ -8,10 +8,10 @@ from fractions import Fraction
 import numpy as np
 
 from hipuq.cea.bounds import Complex
+from hipuq.cea.brackets import Bracket
 from hipuq.cea.certificate import certify_polynomial
 from hipuq.cea.eigenvalues import eigenvalues
 from hipuq.cea.exact import ExactPencil, coalescence, exact_gap, gap_about, scaled, whole
-from hipuq.cea.gaps import Bracket
 from hipuq.cea.pencils import Array
 from hipuq.cea.points import Rows, Sweep, structured_values
 from hipuq.cea.structured import structured_eigenvalues

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hipuq.cea.boundary import Boundary, inside, proved
-from hipuq.cea.gaps import NARROWEST, PARABOLIC, REACH, Bracket, Mask, Triple, crossing, unresolved, vanishing
+from hipuq.cea.brackets import Bracket, crossing, unresolved
+from hipuq.cea.gaps import NARROWEST, PARABOLIC, REACH, Mask, Triple, vanishing
 from hipuq.cea.pencils import Array, Pencils
 from hipuq.cea.points import Points, Rows, Sweep, interpolated
 from hipuq.errors import InputError
