@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.eigenvalues import LARGEST_SIZE
+from hipuq.cea.eigenvalues import finite, kernel_for
 from hipuq.cea.pencils import Array
-from hipuq.compiled.library import kernel
 
 Complex = NDArray[np.complex128]
 
@@ -33,7 +32,13 @@ def norms(matrices: Array) -> Array:
     """Return the Frobenius norm of each matrix, (s,)."""
     s, n, m = matrices.shape
     flat = matrices.reshape(s, n * m)
-    norm: Array = np.sqrt(np.vecdot(flat, flat))
+    with np.errstate(over="ignore"):
+        norm: Array = np.sqrt(np.vecdot(flat, flat))
+    odd = ~((norm > 1e-140) & (norm < 1e140))
+    if odd.any():  # squares may have left the range of doubles
+        largest = np.abs(flat[odd]).max(axis=1, initial=np.finfo(np.float64).tiny)
+        parts = flat[odd] / largest[:, None]
+        norm[odd] = largest * np.sqrt(np.vecdot(parts, parts))
     return norm
 
 
@@ -78,12 +83,10 @@ def conditioned_eigenvalues(matrices: Array) -> tuple[Complex, Array]:
 def _by_lanes(matrices: Array) -> tuple[Complex, Array] | None:
     """Return eigenvalues and condition numbers, None where LAPACK is to find them."""
     s, n = matrices.shape[:2]
-    compiled = kernel()
-    if compiled is None or n > LARGEST_SIZE or not matrices.size:
+    compiled = kernel_for(n)
+    if compiled is None:
         return None
-    matrices = np.ascontiguousarray(matrices, np.float64)
-    if not np.isfinite(matrices).all():
-        raise np.linalg.LinAlgError("Array must not contain infs or NaNs")
+    matrices = finite(matrices)
     values, condition, failed = np.empty((s, n), np.complex128), np.empty((s, n)), np.empty(s, np.bool_)
     into = values.ctypes.data, condition.ctypes.data, failed.ctypes.data
     if compiled.conditioned(s, n, matrices.ctypes.data, *into):

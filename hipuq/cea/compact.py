@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hipuq.cea.entries import Entries, dense
-from hipuq.cea.pencils import LARGEST, Array, Pencils
+from hipuq.cea.pencils import LARGEST, Array, Pencils, as_doubles
+from hipuq.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,9 @@ class CompactPencils:
     filter_radius : float
         As in `Pencils`.
 
+    trusted : bool
+        Whether the numbers were checked before; shapes always are.
+
     Raises
     ------
     InputError
@@ -40,6 +44,7 @@ class CompactPencils:
     friction: Array
     mechanisms: NDArray[np.intp]
     filter_radius: float = 0.0
+    trusted: bool = False
 
     @property
     def size(self) -> int:
@@ -47,7 +52,22 @@ class CompactPencils:
         return len(self.mass)
 
     def __post_init__(self) -> None:
-        numbers = [entries.values for entries in (*self.stiffness, *self.friction_stiffness)]
+        for name in ("mass", "friction"):
+            object.__setattr__(self, name, as_doubles(getattr(self, name)))
+        samples, parts = self.friction.size, (*self.stiffness, *self.friction_stiffness)
+        shapes = self.friction.shape, self.mechanisms.shape
+        columns = {part.values.shape[1] for part in parts} | set(self.mass.shape[1:])
+        if shapes != ((samples,), (samples,)) or self.mass.ndim != 2 or not columns <= {1, samples}:
+            raise InputError(
+                f"friction and mechanisms must have one length, values and masses that many columns or one: "
+                f"their shapes are {shapes}, the columns {columns}"
+            )
+        reach = max((part.reach for part in parts), default=-1)
+        if reach >= self.size:
+            raise InputError(f"entries reach to row or column {reach}: there are {self.size} masses")
+        if self.trusted:
+            return
+        numbers = [part.values for part in parts]
         fine = all(
             values.max(initial=0.0) <= LARGEST and values.min(initial=0.0) >= -LARGEST
             for values in (*numbers, self.friction)
@@ -60,7 +80,7 @@ class CompactPencils:
     @classmethod
     def of(cls, pencils: Pencils) -> CompactPencils:
         """Return the same matrices without their damping, without a copy of diagonal masses and stiffness."""
-        rest = pencils.friction, pencils.mechanisms, pencils.filter_radius
+        rest = pencils.friction, pencils.mechanisms, pencils.filter_radius, True
         if pencils.mass.ndim == 2:
             stiffness, friction_stiffness = Entries.whole(pencils.stiffness), pencils.friction_stiffness
             return cls(pencils.mass.T, (stiffness,), (Entries.whole(friction_stiffness),), *rest)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +11,26 @@ from hipuq.cea.pencils import Array
 from hipuq.compiled.library import kernel
 
 LARGEST_SIZE = 64
-"""Above this size LAPACK, whose blocks fit caches better, is not slower; ``docs/speed.md``."""
+"""Largest matrix that the compiled kernel takes: a block of eight such fits the second cache of most
+processors."""
+
+
+def kernel_for(size: int) -> Any:
+    """Return the compiled kernel, None where it is missing or LAPACK is to do matrices of this size."""
+    return kernel() if size <= LARGEST_SIZE else None
+
+
+def finite(matrices: Array) -> Array:
+    """Return matrices as the kernel takes them.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If a value is not finite.
+    """
+    if not np.isfinite(matrices).all():
+        raise np.linalg.LinAlgError("Array must not contain infs or NaNs")
+    return np.ascontiguousarray(matrices, np.float64)
 
 
 def eigenvalues(matrices: Array) -> NDArray[np.complex128]:
@@ -34,12 +55,10 @@ def eigenvalues(matrices: Array) -> NDArray[np.complex128]:
         If a value is not finite, or the iteration does not end.
     """
     s, n = matrices.shape[:2]
-    compiled = kernel()
-    if compiled is None or n > LARGEST_SIZE or not matrices.size:
+    compiled = kernel_for(n)
+    if compiled is None:
         return np.asarray(np.linalg.eigvals(matrices), np.complex128)
-    matrices = np.ascontiguousarray(matrices, np.float64)
-    if not np.isfinite(matrices).all():
-        raise np.linalg.LinAlgError("Array must not contain infs or NaNs")
+    matrices = finite(matrices)
     values = np.empty((s, n), np.complex128)
     failed = np.empty(s, np.bool_)
     if compiled.eigenvalues(s, n, matrices.ctypes.data, values.ctypes.data, failed.ctypes.data):

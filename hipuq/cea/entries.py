@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.pencils import Array
+from hipuq.cea.pencils import Array, as_doubles
+from hipuq.errors import InputError
 
 Places = NDArray[np.int32]
 
@@ -23,12 +24,40 @@ class Entries:
         Numbers, the sample last; one column holds for all samples.
     source, row, column : (p,) array of int32
         Place p holds ``values[source[p]]`` at (row[p], column[p]).
+
+    Raises
+    ------
+    InputError
+        If the values are not a matrix, or a place lies outside.
     """
 
     values: Array
     source: Places
     row: Places
     column: Places
+
+    def __post_init__(self) -> None:
+        # The compiled kernel reads by address: types and places must be right.
+        object.__setattr__(self, "values", as_doubles(self.values))
+        for name in ("source", "row", "column"):
+            object.__setattr__(self, name, np.require(getattr(self, name), np.int32, ["C", "A"]))
+        places = self.source, self.row, self.column
+        if self.values.ndim != 2 or {part.shape for part in places} != {(self.source.size,)}:
+            raise InputError(
+                f"entries need values (m, samples) and places of one length: they have {self.values.shape} "
+                f"and {[part.shape for part in places]}"
+            )
+        least = min(int(part.min(initial=0)) for part in places)
+        most, count = int(self.source.max(initial=-1)), len(self.values)
+        if least < 0 or most >= count:
+            raise InputError(
+                f"places of entries must lie from 0 on and take one of {count} values: {least}, {most}"
+            )
+
+    @property
+    def reach(self) -> int:
+        """Largest row or column, -1 where there is none."""
+        return int(max(self.row.max(initial=-1), self.column.max(initial=-1)))
 
     @classmethod
     def whole(cls, matrices: Array) -> Entries:

@@ -17,6 +17,11 @@ LARGEST = 1e140
 """Largest entry: squares of entries must stay in the range of doubles."""
 
 
+def as_doubles(values: Array) -> Array:
+    """Return values as native doubles, themselves if they are that."""
+    return np.require(values, np.float64, "A")
+
+
 @dataclass(frozen=True)
 class Pencils:
     """Matrices of a batch of s samples with n degrees of freedom.
@@ -57,6 +62,9 @@ class Pencils:
     filter_radius: float = 0.0
 
     def __post_init__(self) -> None:
+        for name in ("mass", "stiffness", "friction_stiffness", "friction", "damping"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, as_doubles(getattr(self, name)))
         shape = self.stiffness.shape
         if len(shape) != 3 or shape[1] != shape[2]:
             raise InputError(f"stiffness must have the shape (samples, n, n), not {shape}")

@@ -12,15 +12,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.cea.bounds import ALWAYS, AUTO, NEVER
+from hipuq.cea.bounds import ALWAYS, AUTO, CERTIFICATE, NEVER
 from hipuq.cea.compact import CompactPencils
 from hipuq.cea.damped import damped_modes
-from hipuq.cea.eigenvalues import LARGEST_SIZE
+from hipuq.cea.eigenvalues import kernel_for
 from hipuq.cea.lanes import lane_modes
 from hipuq.cea.pencils import Array, Pencils
 from hipuq.cea.spectra import Spectra
 from hipuq.cea.undamped import undamped_modes
-from hipuq.compiled.library import kernel
 from hipuq.errors import InputError, check_name
 
 
@@ -69,8 +68,8 @@ def solve(
 
 def _by_lanes(pencils: Pencils | CompactPencils, threshold: float) -> tuple[Spectra, NDArray[np.intp]] | None:
     """Let the compiled kernel judge what it can; return that and the samples that it leaves open."""
-    compiled = kernel()
-    if compiled is None or pencils.size > LARGEST_SIZE:
+    compiled = kernel_for(pencils.size)
+    if compiled is None:
         return None
     if isinstance(pencils, CompactPencils):
         spectra, open_ = lane_modes(compiled, pencils, threshold)
@@ -109,8 +108,10 @@ def _by_bounds(pencils: Pencils, threshold: float, certify: str, filter_radius: 
             pencils.filter_radius,
         )
     unstable = np.where(known, growth > threshold, np.nan).astype(np.float32)
-    # The certificate may find more zero roots than were declared: they are mechanisms too.
-    found = (known & (frequency == 0) & (growth == 0)).sum(axis=1)
+    # The certificate may find more zero roots than were declared: they are mechanisms too. That a root
+    # comes out as exactly zero in double precision is chance.
+    zero = known & (frequency == 0) & (growth == 0)
+    found = np.where(decided_by == CERTIFICATE, zero.sum(axis=1), 0)
     spectra = Spectra(frequency, growth, unstable, margin, np.maximum(mechanisms, found), decided_by)
     undecided = np.isnan(spectra.any_unstable)
     margin[undecided] = np.nan

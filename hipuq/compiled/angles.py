@@ -51,7 +51,7 @@ def cosine_and_sine(angle: Array) -> tuple[Array, Array]:
     -------
     cosine, sine : array of the same shape
     """
-    angle = np.ascontiguousarray(angle, np.float64)
+    angle = np.require(angle, np.float64, ["C", "A"])
     if np.abs(angle).max(initial=0.0) > LARGEST_ANGLE:
         angle = np.fmod(angle, 360.0)
     compiled = kernel()

@@ -163,10 +163,11 @@ static Mask conditions_of(int n, int ld, Parts t, Vec *restrict copy, Vec *restr
             im = im * inverse * inverse;
             yy_scaled = plus(plus(yy_scaled, re, re), im, im);
         }
-        xx = pick(scaled, xx_scaled, xx);
-        yy = pick(scaled, yy_scaled, yy);
-        const Vec own = root_of(xx) * root_of(yy);
-        const Mask sound = (own <= DBL_MAX) & (xx > 1e-290) & (yy > 1e-290);
+        /* The rounding of the sweeps is that of the balanced matrix, so its own number counts too. */
+        const Vec balanced = root_of(xx) * root_of(yy), given = root_of(xx_scaled) * root_of(yy_scaled);
+        const Vec own = pick(scaled, larger(balanced, given), balanced);
+        const Mask sound = (own <= 1e150) & (xx > 1e-290) & (yy > 1e-290)
+            & (~scaled | ((xx_scaled > 1e-290) & (yy_scaled > 1e-290)));
         condition[k] = pick(sound, larger(own, all(1)), all(INFINITY));
     }
     /* The members of a complex pair share the larger number. */

@@ -31,8 +31,10 @@ typedef struct {
 INLINE Reflector reflector(Vec head, Vec tail_squared, Mask among)
 {
     Reflector r;
-    r.beta = -with_sign(root_of(plus(tail_squared, head, head)), head);
-    r.live = among & (tail_squared > 0.0);
+    const Vec squared = plus(tail_squared, head, head);
+    r.beta = -with_sign(root_of(squared), head);
+    /* Where squares lose digits there is nothing to turn: the largest entry of the matrix is near 1. */
+    r.live = among & (tail_squared > 0.0) & (squared > 1e-280);
     const Vec difference = pick(r.live, head - r.beta, all(1));
     const Vec safe = pick(r.live, r.beta, all(1));
     /* Two divisions where one would do: with one, what sweeps do to eigenvalues is 40 % worse. */

@@ -144,6 +144,8 @@ static int undamped(const HipuqBatch *batch, double threshold, const HipuqBounds
         }
         Mask known = ~lost & take_mechanisms(n, roots, sample.mechanisms, bounds->zero * sample.norm, !uniform);
         known &= known_sides(n, roots, threshold);
+        /* Squares of smaller or larger roots leave the range of doubles. */
+        known &= (sample.norm > 1e-140) & (sample.norm < 1e140);
         put_in_order(n, roots);
         const Vec scale = scale_of(n, sample);
         Vec margin = threshold > 0.0 ? all(0) : gap_margin(n, roots, scale);

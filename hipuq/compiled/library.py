@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+import warnings
 from ctypes import POINTER, Structure, c_double, c_int, c_int64, c_void_p
 from functools import cache
 from pathlib import Path
@@ -106,13 +107,17 @@ def kernel() -> Any:
         raise InputError(f"{SWITCH} is {wanted!r}: it must be empty, {LAPACK!r} or one of {TARGETS}")
     if wanted == LAPACK:
         return None
+    path = Path(__file__).with_name(FILE)
     try:
-        library = ctypes.CDLL(str(Path(__file__).with_name(FILE)))
+        library = ctypes.CDLL(str(path))
     except OSError as error:
         if wanted:
             raise InputError(
                 f"{SWITCH} is {wanted!r}, but the compiled library is missing: {error}"
             ) from None
+        if path.exists():
+            told = f"LAPACK does the work of {FILE}, which does not load: {error}"
+            warnings.warn(told, RuntimeWarning, stacklevel=2)
         return None
     interface = getattr(library, "hipuq_interface", None)
     if interface is None or interface() != INTERFACE:

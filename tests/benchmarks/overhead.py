@@ -50,15 +50,14 @@ def bare_kernel(model: hipuq.models.CEAModel, samples: xr.Dataset) -> Callable[[
     def one(start: int) -> None:
         rows = slice(start, min(start + model.block, size))
         count = rows.stop - rows.start
+        block = {
+            name: values[name][rows]
+            if name in values
+            else np.broadcast_to(own.nominal, (count, *own.nominal.shape))
+            for name, own in model.parameters.items()
+        }
         solve(
-            model.assemble(
-                {
-                    name: values[name][rows]
-                    if name in values
-                    else np.broadcast_to(own.nominal, (count, *own.nominal.shape))
-                    for name, own in model.parameters.items()
-                }
-            ),
+            model.compact(block) or model.assemble(block),
             growth_threshold=model.growth_threshold,
             certify=model.certify,
         )
