@@ -13,6 +13,7 @@ import contextlib
 import importlib.util
 import os
 import platform
+import runpy
 import shlex
 import shutil
 import subprocess
@@ -112,7 +113,9 @@ class CustomBuildHook(BuildHookInterface[Any]):
 def own_compiler(folder: Path) -> list[str] | None:
     """Return the machine's first C compiler that makes libraries for this Python, as words of a command."""
     (folder / "trial.c").write_text(TRIAL)
-    for compiler in (shlex.split(os.environ.get("CC", "")), ["cc"], ["gcc"], ["clang"]):
+    # On Windows gcc does not align the stack for wide registers.
+    usual = [] if sys.platform == "win32" else [["cc"], ["gcc"], ["clang"]]
+    for compiler in (shlex.split(os.environ.get("CC", "")), *usual):
         if compiler and shutil.which(compiler[0]):
             with contextlib.suppress(CompilationError):
                 link(compiler, ["trial.c"], "trial.so", folder)
@@ -150,6 +153,8 @@ def make_library(sources: Path, folder: Path, *, every_target: bool) -> Path:
         else:
             objects.append(f"{target}.o")
             have.append(f"-DHAVE_{target.upper()}")
+    made_of = runpy.run_path(str(sources / "sources.py"))["digest"](sources)
+    have.append(f"-DHIPUQ_SOURCES={made_of:#x}ULL")
     show(link(compiler, [*have, "dispatch.c", *objects], LIBRARY, folder))
     return folder / LIBRARY
 

@@ -18,7 +18,8 @@ extern const HipuqKernel hipuq_avx2;
 extern const HipuqKernel hipuq_avx512;
 #endif
 
-EXPORT int hipuq_interface(void) { return HIPUQ_INTERFACE; }
+/* The digest of the sources that the build gives: a library left over from others is not used. */
+EXPORT uint64_t hipuq_sources(void) { return HIPUQ_SOURCES; }
 
 /* The kernel of that name, or the best one if `name` is empty; NULL where it cannot run here. */
 EXPORT const HipuqKernel *hipuq_kernel(const char *name)

@@ -4,9 +4,6 @@
 
 #include <stdint.h>
 
-/* Goes up with every change of what follows: a library left over from older sources is not used. */
-enum { HIPUQ_INTERFACE = 3 };
-
 /* Entries of the matrices of all samples, at places that they share: entry p of sample s is
  * values[source[p] * row_stride + s * sample_stride] at (row[p], column[p]). */
 typedef struct {

@@ -6,11 +6,12 @@ import ctypes
 import os
 import sys
 import warnings
-from ctypes import POINTER, Structure, c_double, c_int, c_int64, c_void_p
+from ctypes import POINTER, Structure, c_double, c_int, c_int64, c_uint64, c_void_p
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from hipuq.compiled.sources import digest
 from hipuq.errors import InputError
 
 SWITCH = "HIPUQ_KERNEL"
@@ -19,10 +20,6 @@ TARGETS = ("avx512", "avx2", "baseline")
 """Instruction sets, the best one first."""
 
 FILE = "_kernel" + {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-
-
-INTERFACE = 3
-"""``HIPUQ_INTERFACE`` of `kernel.h`."""
 
 
 class Term(Structure):
@@ -82,7 +79,10 @@ class Kernel(Structure):
         ("name", ctypes.c_char_p),
         ("lanes", c_int),
         ("eigenvalues", ctypes.CFUNCTYPE(c_int, c_int64, c_int64, c_void_p, c_void_p, c_void_p)),
-        ("conditioned", ctypes.CFUNCTYPE(c_int, c_int64, c_int64, c_void_p, c_void_p, c_void_p, c_void_p)),
+        (
+            "conditioned",
+            ctypes.CFUNCTYPE(c_int, c_int64, c_int64, c_void_p, c_void_p, c_void_p, c_void_p),
+        ),
         ("undamped", ctypes.CFUNCTYPE(c_int, POINTER(Batch), c_double, POINTER(Bounds), POINTER(Modes))),
         ("degrees", ctypes.CFUNCTYPE(None, c_int64, c_void_p, c_void_p, c_void_p)),
     )
@@ -100,7 +100,7 @@ def kernel() -> Any:
     Raises
     ------
     InputError
-        If `SWITCH` names no kernel or one that cannot run here, or the library is of another version.
+        If `SWITCH` names no kernel or one that cannot run here, or the library is of other sources.
     """
     wanted = os.environ.get(SWITCH, "")
     if wanted not in ("", LAPACK, *TARGETS):
@@ -119,10 +119,10 @@ def kernel() -> Any:
             told = f"LAPACK does the work of {FILE}, which does not load: {error}"
             warnings.warn(told, RuntimeWarning, stacklevel=2)
         return None
-    interface = getattr(library, "hipuq_interface", None)
-    if interface is None or interface() != INTERFACE:
+    there = digest(path.parent)
+    if there is not None and _made_of(library) != there:
         raise InputError(
-            f"the compiled library {FILE} is of another version of hipuq: install hipuq again, "
+            f"the compiled library {FILE} was compiled from other sources: install hipuq again, "
             f"or set {SWITCH}={LAPACK}"
         )
     choose = library.hipuq_kernel
@@ -131,6 +131,16 @@ def kernel() -> Any:
     if not found:
         raise InputError(f"{SWITCH} is {wanted!r}: this library or processor has no such kernel")
     return found.contents
+
+
+def _made_of(library: ctypes.CDLL) -> int | None:
+    """Return the digest of the sources of a library, None if it is too old to have one."""
+    try:
+        function = library.hipuq_sources
+    except AttributeError:
+        return None
+    function.restype = c_uint64
+    return int(function())
 
 
 def kernel_name() -> str:
