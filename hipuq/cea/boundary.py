@@ -84,6 +84,10 @@ def proved(sweep: Sweep, brackets: list[Bracket]) -> list[list[Boundary]]:
         prove = _flutter if bracket.change[0] else _divergence
         own = exact[bracket.row]
         boundary = prove(sweep, own, bracket, place, start)
+        if place.by_newton and not boundary.certified:
+            # The double root that Newton's method found may be another one.
+            place = _Solved(*_bracketed(own, bracket, int(sweep.mechanisms[bracket.row])))
+            boundary = prove(sweep, own, bracket, place, start)
         if boundary.certified or _differs(sweep, own, bracket):
             result[bracket.row].append(boundary)
     ordered = (sorted(part, key=lambda one: one.friction) for part in result)
@@ -96,6 +100,7 @@ class _Solved:
 
     friction: float
     centre: float
+    by_newton: bool = False
 
     @property
     def sides(self) -> tuple[float, float]:
@@ -112,7 +117,7 @@ def _solved(exact: ExactPencil, bracket: Bracket, mechanisms: int) -> _Solved:
         t = float(f0 / (f0 - f1))
         found = coalescence(exact, float(x0 + (x1 - x0) * t), float(c0 + (c1 - c0) * t))
         if found is not None and x0 < found[0] < x1:
-            return _Solved(found[0], scaled(found[1], exact.exponent))
+            return _Solved(found[0], scaled(found[1], exact.exponent), by_newton=True)
     return _Solved(*_bracketed(exact, bracket, mechanisms))
 
 
@@ -177,6 +182,9 @@ def _flutter(sweep: Sweep, exact: ExactPencil, bracket: Bracket, solved: _Solved
         polynomial = exact.at(side)
         # The pair itself from its exact squared gap: approximations of it are not good enough.
         gap, middle = gap_about(polynomial, whole(solved.centre, exact.exponent), exact.exponent)
+        if np.isnan(gap):
+            counts.append(None)
+            continue
         half = np.sqrt(complex(gap)) / 2
         roots = np.concatenate([np.zeros(m), rest, [middle + half, middle - half]])
         values = certify_polynomial(polynomial, exact.exponent, roots, m, sweep.norm[bracket.row])

@@ -12,12 +12,13 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hipuq.cea.boundary import Boundary, inside
-from hipuq.cea.bounds import NEVER
+from hipuq.cea.bounds import AUTO, NEVER
 from hipuq.cea.damped_onset import damped_boundaries
 from hipuq.cea.onset import check_range, search
 from hipuq.cea.overtaking import Change, located
@@ -38,7 +39,8 @@ LOOKS_BY_MODE = 33
 """The same where modes are told apart: one that overtakes another twice between two of them is not seen."""
 
 SURE = 3
-"""Of those every so manieth is solved with its bounds, others where plain eigenvalues differ from it."""
+"""Every so manieth of those is solved by all means. At the others double precision is asked; where it knows
+nothing the modes that grow fastest are taken, as many as there are, if that agrees with the neighbours."""
 
 FINEST = 1e-10
 """Width to which an overtaking is located, as part of the range."""
@@ -125,7 +127,9 @@ def stability_cells(
     pieces = [
         _pieces(*cell, by_mode) for cell in zip(row.tolist(), start, friction, unstable, fits, strict=True)
     ]
-    _locate(pencils, pieces, growth_threshold, FINEST * (upper - lower))
+    # Not below the distance of doubles, where nothing lies between two frictions.
+    finest = max(FINEST * (upper - lower), 4 * float(np.spacing(max(abs(lower), abs(upper)))))
+    _locate(pencils, pieces, growth_threshold, finest)
     cells = []
     for i, own in enumerate(found):
         parts = [part for j in np.flatnonzero(row == i) for part in pieces[j]]
@@ -207,48 +211,47 @@ def _looked(pencils: Pencils, row: Rows, friction: Array, growth_threshold: floa
     places = np.arange(friction.shape[1])
     sure = places % SURE == 1 if by_mode else np.ones(len(places), bool)
     rows = np.repeat(row[:, None], len(places), axis=1)
-    made = np.full((*friction.shape, pencils.stiffness.shape[1]), np.nan)
-    made[:, sure] = _seen(pencils, rows[:, sure], friction[:, sure], growth_threshold)[0]
+    made = np.full((*friction.shape, pencils.size), np.nan)
+    made[:, sure] = _seen(pencils, rows[:, sure], friction[:, sure], growth_threshold).unstable
     if sure.all():
         return made
+    quick = _seen(pencils, rows[:, ~sure], friction[:, ~sure], growth_threshold, NEVER)
+    # Where double precision leaves it open: the modes that seem to grow fastest, as many as there are.
     count = np.nan_to_num(np.fmax.reduce(made[:, sure].sum(axis=2), axis=1))
-    some = count > 0
-    guess = np.zeros((len(row), (~sure).sum(), made.shape[2]))
-    guess[some] = _guessed(
-        pencils, rows[:, ~sure][some], friction[:, ~sure][some], growth_threshold, count[some]
-    )
+    rank = np.argsort(np.argsort(-quick.growth_rate, axis=2, kind="stable"), axis=2)
+    open_: Mask = np.asarray(np.isnan(quick.unstable).any(axis=2))
+    guess = np.where(open_[:, :, None], rank < count[:, None, None], quick.unstable)
     last = np.searchsorted(places[sure], places[~sure])
-    same = np.ones(guess.shape[:2], bool)
     for beside in (last - 1, last):
-        same &= (guess == made[:, sure][:, beside.clip(0, sure.sum() - 1)]).all(axis=2)
-    guess[~same] = _seen(pencils, rows[:, ~sure][~same], friction[:, ~sure][~same], growth_threshold)[0]
+        near = made[:, sure][:, beside.clip(0, sure.sum() - 1)]
+        odd = open_ & (guess != near).any(axis=2)
+        guess[odd] = _seen(pencils, rows[:, ~sure][odd], friction[:, ~sure][odd], growth_threshold).unstable
+        open_ &= ~odd
     made[:, ~sure] = guess
     return made
 
 
-def _seen(pencils: Pencils, row: Rows, friction: Array, growth_threshold: float) -> tuple[Array, Array]:
-    """Return which modes of samples are unstable at frictions, NaN where not known, and frequencies [Hz].
+class _Seen(NamedTuple):
+    """What is seen of modes, each of the shape of the frictions and one more axis, (..., n)."""
 
-    Both of the shape of the frictions and one more axis, (..., n).
-    """
-    n = pencils.stiffness.shape[1]
-    unstable, frequency = np.empty((friction.size, n)), np.empty((friction.size, n))
+    unstable: Array
+    """NaN where not known."""
+    frequency: Array
+    """[Hz]"""
+    growth_rate: Array
+    """[1/s]"""
+
+
+def _seen(
+    pencils: Pencils, row: Rows, friction: Array, growth_threshold: float, certify: str = AUTO
+) -> _Seen:
+    """Return what is seen of the modes of samples at frictions."""
+    seen = _Seen(*np.empty((3, friction.size, pencils.size)))
     for part, own in _blocks(pencils, row, friction):
-        spectra = solve(own, growth_threshold=growth_threshold)
-        unstable[part], frequency[part] = spectra.unstable, spectra.frequency
-    return unstable.reshape(*friction.shape, n), frequency.reshape(*friction.shape, n)
-
-
-def _guessed(pencils: Pencils, row: Rows, friction: Array, growth_threshold: float, count: Array) -> Array:
-    """Return the modes that grow fastest in cells, as many as are unstable, by plain eigenvalues."""
-    growth = np.empty((friction.size, pencils.stiffness.shape[1]))
-    # Every eigenvalue is taken for what it looks like.
-    plain = replace(pencils, filter_radius=float(np.finfo(np.float64).tiny))
-    for part, own in _blocks(plain, row, friction):
-        growth[part] = solve(own, growth_threshold=growth_threshold, certify=NEVER).growth_rate
-    growth = growth.reshape(*friction.shape, growth.shape[1])
-    rank = np.argsort(np.argsort(-growth, axis=2, kind="stable"), axis=2)
-    return np.asarray(rank < count[:, None, None], np.float64)
+        spectra = solve(own, growth_threshold=growth_threshold, certify=certify)
+        for into, name in zip(seen, _Seen._fields, strict=True):
+            into[part] = getattr(spectra, name)
+    return _Seen(*(into.reshape(*friction.shape, pencils.size) for into in seen))
 
 
 def _blocks(pencils: Pencils, row: Rows, friction: Array) -> Iterator[tuple[slice, Pencils]]:
@@ -294,7 +297,8 @@ def _locate(pencils: Pencils, pieces: list[list[_Piece]], growth_threshold: floa
     """
 
     def look(cells: list[int], friction: Array) -> tuple[Array, Array]:
-        return _seen(pencils, np.array([pieces[k][0].row for k in cells]), friction, growth_threshold)
+        seen = _seen(pencils, np.array([pieces[k][0].row for k in cells]), friction, growth_threshold)
+        return seen.unstable, seen.frequency
 
     changes = [
         Change(k, [a.last, b.first], [a.unstable, b.unstable])
