@@ -36,6 +36,11 @@ class Parameter:
 
     def check(self, name: str, values: Array) -> None:
         """Raise an InputError if any of the values, sample first, is not allowed."""
+        if not self.boolean and values.size:
+            low, high = values.min(), values.max()
+            inside = low > self.minimum if self.open else low >= self.minimum
+            if inside and -np.inf < low and high < np.inf:
+                return
         units = schema.PARAMETERS[name].units
         unit = "" if units == "1" else f" {units}"
         if self.boolean:
