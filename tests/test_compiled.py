@@ -25,8 +25,8 @@ from hipuq.cea.bounds import EPS, SAFETY, conditioned_eigenvalues, norms
 from hipuq.cea.compact import CompactPencils
 from hipuq.cea.eigenvalues import LARGEST_SIZE, eigenvalues
 from hipuq.cea.entries import Entries, dense
-from hipuq.compiled import angles, library
-from hipuq.compiled.library import LAPACK, SWITCH, kernel
+from hipuq.compiled import angles, binding
+from hipuq.compiled.binding import LAPACK, SWITCH, kernel
 from hipuq.errors import InputError
 
 
@@ -43,9 +43,7 @@ def runs_here(name):
         return False
 
 
-COMPILED = [name for name in library.TARGETS if runs_here(name)]
-
-need_compiled = pytest.mark.skipif(not COMPILED, reason="the library was not compiled")
+COMPILED = [name for name in binding.TARGETS if runs_here(name)]
 
 
 @pytest.fixture(params=[*COMPILED, LAPACK])
@@ -246,7 +244,6 @@ def cases_of_verdicts():
     yield random_pencils(3, 20, 4, damped=True)
 
 
-@need_compiled
 @pytest.mark.parametrize("threshold", [0.0, 5.0])
 def test_verdicts_do_not_depend_on_the_kernel(monkeypatch, threshold):
     spectra = {}
@@ -274,10 +271,10 @@ def test_an_unknown_kernel_is_one_clear_error(monkeypatch, name):
 
 def test_a_library_that_is_missing_or_of_other_sources(monkeypatch):
     if COMPILED:
-        monkeypatch.setattr(library, "digest", lambda folder: 0)
+        monkeypatch.setattr(binding, "digest", lambda folder: 0)
         with pytest.raises(InputError, match="compiled from other sources"):
             chosen("")
-    monkeypatch.setattr(library, "FILE", "nothing.so")
+    monkeypatch.setattr(binding, "FILE", "nothing.so")
     assert chosen("") is None
     assert chosen(LAPACK) is None
     with pytest.raises(InputError, match="'baseline', but the compiled library is missing"):

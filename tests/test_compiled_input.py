@@ -7,7 +7,7 @@ import hipuq
 from hipuq.cea import CompactPencils, Entries, Pencils, solve
 from hipuq.cea.bounds import norms
 from hipuq.cea.spectra import Spectra
-from hipuq.compiled import library
+from hipuq.compiled import binding
 from hipuq.compiled.angles import cosine_and_sine
 from hipuq.errors import InputError
 
@@ -186,8 +186,8 @@ def test_a_root_that_happens_to_be_zero_is_no_mechanism():
 
 
 def test_a_library_that_does_not_load_is_told_of(monkeypatch, tmp_path):
-    (tmp_path / library.FILE).write_bytes(b"no library")
-    monkeypatch.setattr(library, "__file__", str(tmp_path / "library.py"))
-    monkeypatch.delenv(library.SWITCH, raising=False)
+    (tmp_path / binding.FILE).write_bytes(b"no library")
+    monkeypatch.setattr(binding, "__file__", str(tmp_path / "binding.py"))
+    monkeypatch.delenv(binding.SWITCH, raising=False)
     with pytest.warns(RuntimeWarning, match="does not load"):
-        assert library.kernel.__wrapped__() is None
+        assert binding.kernel.__wrapped__() is None

@@ -142,6 +142,7 @@ def test_registries_agree_with_their_folders():
     modules = {function.__module__.split(".")[-1] for function in MODELS.values()}
     assert {path.stem for path in (PACKAGE / "models").glob("*.py")} - {
         "base",
+        "blocks",
         "onset",
         "parameter",
         "sensitivity",

@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import hipuq
 from hipuq.cea.eigenvalues import eigenvalues
-from hipuq.compiled.library import kernel_name
+from hipuq.compiled.binding import kernel_name
 
 SIZE = 18
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hipuq.cea.pencils import Array
-from hipuq.compiled.library import kernel
+from hipuq.compiled.binding import kernel
 
 LARGEST_SIZE = 64
 """Largest matrix that the compiled kernel takes: a block of eight such fits the second cache of most

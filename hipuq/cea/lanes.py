@@ -13,7 +13,7 @@ from hipuq.cea.compact import CompactPencils
 from hipuq.cea.entries import Entries
 from hipuq.cea.pencils import Array
 from hipuq.cea.spectra import Spectra
-from hipuq.compiled.library import Batch, Bounds, Modes, Term
+from hipuq.compiled.binding import Batch, Bounds, Modes, Term
 
 
 def lane_modes(compiled: Any, pencils: CompactPencils, threshold: float) -> tuple[Spectra, NDArray[np.bool_]]:
@@ -22,7 +22,7 @@ def lane_modes(compiled: Any, pencils: CompactPencils, threshold: float) -> tupl
     Parameters
     ----------
     compiled : Kernel
-        Of `hipuq.compiled.library`.
+        Of `hipuq.compiled.binding`.
     pencils : CompactPencils
         Errors are bounded by the filter radius; where it is 0, by the condition number of each eigenvalue.
     threshold : float

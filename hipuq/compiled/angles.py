@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hipuq.compiled.library import kernel
+from hipuq.compiled.binding import kernel
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-/* What the library offers; hipuq/compiled/library.py declares the same. All strides count doubles. */
+/* What the library offers; hipuq/compiled/binding.py declares the same. All strides count doubles. */
 #ifndef HIPUQ_KERNEL_H
 #define HIPUQ_KERNEL_H
 

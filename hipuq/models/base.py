@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hipuq import schema
 from hipuq.cea import ALWAYS, AUTO, NEVER, CompactPencils, Pencils, Spectra, mode_shapes, solve
-from hipuq.compiled.library import kernel
+from hipuq.compiled.binding import kernel
 from hipuq.errors import InputError, SchemaError, check_name, unknown_name
 from hipuq.inputs import Inputs
 from hipuq.models.parameter import Parameter

@@ -12,7 +12,7 @@ four entries of equation 7 are mu kc t n^T, because cos^2 b + sin^2 b = 1.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -21,11 +21,11 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from hipuq import schema
-from hipuq.cea import CompactPencils, Entries, Pencils
-from hipuq.cea.entries import rows_apart
+from hipuq.cea import CompactPencils, Pencils
 from hipuq.compiled.angles import cosine_and_sine
 from hipuq.errors import InputError, check_name
 from hipuq.models.base import LINEAR, CEAModel
+from hipuq.models.blocks import at_blocks, dyads, sample_last
 from hipuq.models.parameter import Parameter
 from hipuq.sampling import check_count
 
@@ -189,22 +189,22 @@ class OscillatorRing(CEAModel):
         -------
         CompactPencils
         """
-        own = {name: _sample_last(values[name]) for name in values if values[name].ndim == 2}
+        own = {name: sample_last(values[name]) for name in values if values[name].ndim == 2}
         count = self.oscillators
         spring = cosine_and_sine(own["spring_angle"])
         contact, friction = cosine_and_sine(own["contact_angle"]), cosine_and_sine(own["friction_angle"])
-        springs = _dyads(own["spring_stiffness"], spring, spring)
+        springs = dyads(own["spring_stiffness"], spring, spring)
         force = own["contact_stiffness"] * own["contact"]
-        contacts = _dyads(force, contact, contact)
+        contacts = dyads(force, contact, contact)
         blocks = springs[:, :, :-1] + springs[:, :, 1:]
         blocks = np.add(blocks, contacts, out=contacts if contacts.shape == blocks.shape else None)
         beside = np.negative(springs, out=springs)
         stiffness = (
-            _at_blocks(blocks, [(i, i) for i in range(count)]),
-            _at_blocks(beside, [(i, i + 1) for i in range(count - 1)], first=1),
-            _at_blocks(beside, [(i + 1, i) for i in range(count - 1)], first=1),
+            at_blocks(blocks, [(i, i) for i in range(count)]),
+            at_blocks(beside, [(i, i + 1) for i in range(count - 1)], first=1),
+            at_blocks(beside, [(i + 1, i) for i in range(count - 1)], first=1),
         )
-        friction_stiffness = (_at_blocks(_dyads(force, friction, contact), [(i, i) for i in range(count)]),)
+        friction_stiffness = (at_blocks(dyads(force, friction, contact), [(i, i) for i in range(count)]),)
         # Springs and contacts are N + 1 + contacts constraints on 2 N degrees of freedom; friction
         # acts through the same contact normals, so it removes no mechanism.
         contact_count = values["contact"].sum(axis=1).astype(np.intp)
@@ -216,36 +216,6 @@ class OscillatorRing(CEAModel):
             mechanisms=np.maximum(0, 2 * count - (count + 1) - contact_count),
             filter_radius=FILTER if count <= FILTER_OSCILLATORS else 0.0,
         )
-
-
-def _sample_last(values: Array) -> Array:
-    """Return values (s, size) as (size, s), or (size, 1) where one sample stands for all."""
-    return np.ascontiguousarray(values[:1].T if values.strides[0] == 0 else values.T)
-
-
-def _dyads(stiffness: Array, row: tuple[Array, Array], column: tuple[Array, Array]) -> Array:
-    """Return stiffness times unit vector times unit vector transposed, (2, 2, size, s).
-
-    Unit vectors are given by their cosines and sines, (size, s) or (size, 1), as the stiffness is.
-    """
-    dyads = rows_apart((2, 2, *np.broadcast_shapes(stiffness.shape, row[0].shape, column[0].shape)))
-    for x, y in np.ndindex(2, 2):
-        np.multiply(row[x], column[y], out=dyads[x, y])
-        dyads[x, y] *= stiffness
-    return dyads
-
-
-def _at_blocks(blocks: Array, places: Sequence[tuple[int, int]], first: int = 0) -> Entries:
-    """Return blocks (2, 2, size, s), from the `first` on, as entries at these block rows and columns."""
-    size = blocks.shape[2]
-    return Entries.at(
-        blocks.reshape(4 * size, -1),
-        [
-            ((2 * x + y) * size + first + k, 2 * i + x, 2 * j + y)
-            for k, (i, j) in enumerate(places)
-            for x, y in np.ndindex(2, 2)
-        ],
-    )
 
 
 def _damping(mass: Array, stiffness: Array, values: Mapping[str, Array]) -> Array | None:

@@ -6,7 +6,7 @@ import platform
 from contextlib import suppress
 from importlib import metadata
 
-from hipuq.compiled.library import kernel_name
+from hipuq.compiled.binding import kernel_name
 
 PACKAGES = ("hipuq", "numpy", "scipy", "xarray", "chaospy", "SALib", "python-flint")
 """Packages that numbers depend on."""

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from pairing import Laps, Row
 
-from hipuq.compiled.library import kernel
+from hipuq.compiled.binding import kernel
 
 BEGIN, END = "<!-- measured -->", "<!-- measured: end -->"
 """Lines of a page between which the table stands."""
