@@ -144,6 +144,7 @@ def test_registries_agree_with_their_folders():
         "base",
         "blocks",
         "onset",
+        "outcomes",
         "parameter",
         "sensitivity",
         "shapes",

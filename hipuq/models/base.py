@@ -11,10 +11,11 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from hipuq import schema
-from hipuq.cea import ALWAYS, AUTO, NEVER, CompactPencils, Pencils, Spectra, mode_shapes, solve
+from hipuq.cea import ALWAYS, AUTO, NEVER, CompactPencils, Pencils, mode_shapes, solve
 from hipuq.compiled.binding import kernel
-from hipuq.errors import InputError, SchemaError, check_name, unknown_name
+from hipuq.errors import InputError, SchemaError, check_name
 from hipuq.inputs import Inputs
+from hipuq.models.outcomes import labelled_outcomes
 from hipuq.models.parameter import Parameter
 from hipuq.models.shapes import labelled_shapes
 from hipuq.variation import Nominal
@@ -296,30 +297,7 @@ class CEAModel(ABC):
         values = self.values(samples)
         pencils = self.compact(values) or self.assemble(values)
         spectra = solve(pencils, growth_threshold=self.growth_threshold, certify=self.certify)
-        return self._outcomes(spectra, self.outcomes if keep is None else tuple(keep))
-
-    def _outcomes(self, spectra: Spectra, keep: tuple[str, ...]) -> xr.Dataset:
-        any_unstable = spectra.any_unstable
-        undecided = np.isnan(any_unstable)
-        data: dict[str, Any] = {}
-        for name in keep:
-            if name in schema.OUTCOMES:
-                variable = schema.OUTCOMES[name]
-                values = any_unstable if name == "any_unstable" else getattr(spectra, name)
-                data[name] = (variable.dims, values, variable.attrs)
-            elif name not in ("status", "decided_by"):
-                raise unknown_name("outcome", name, self.outcomes)
-        status = np.where(undecided, schema.STATUS["undecided"], schema.STATUS["ok"]).astype(np.int8)
-        data["status"] = ("sample", status, schema.flag_attrs("status of the sample", schema.STATUS))
-        data["decided_by"] = (
-            "sample",
-            spectra.decided_by,
-            schema.flag_attrs("what decided the verdict", schema.DECIDED_BY),
-        )
-        coords = {}
-        if any("mode" in value[0] for value in data.values()):
-            coords = self.mode_coordinates()
-        return xr.Dataset(data, coords=coords)
+        return labelled_outcomes(spectra, self.outcomes if keep is None else tuple(keep), self)
 
     def mode_coordinates(self) -> dict[str, Any]:
         """Return the coordinate ``mode`` and the pair that each mode closes by flutter.
