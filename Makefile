@@ -14,6 +14,7 @@ BIN = $(VENV)/bin
 # A stamp is as new as the last complete installation.
 RUNTIME = $(VENV)/.installed
 DEV = $(VENV)/.installed-dev
+DOCS = $(VENV)/.installed-docs
 LOWEST_DEV = $(LOWEST)/.installed-dev
 
 # The kernel is compiled by the installation, into the source tree.
@@ -23,7 +24,7 @@ CHECK_KERNEL = ls hipuq/compiled/_kernel.* >/dev/null 2>&1 || \
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help study test test-lowest bench lint types lock clean
+.PHONY: help study test test-lowest bench docs lint types lock clean
 
 help:  ## List the targets
 	@sed -n 's/^\([a-z-]*\):[^#]*## /\1 /p' Makefile | while read -r name what; \
@@ -42,6 +43,12 @@ test-lowest: $(LOWEST_DEV)  ## Run the tests with the lowest versions that pypro
 
 bench: $(DEV)  ## Measure speed against NumPy, chaospy and SALib, see docs/speed.md; ARGS go to pytest
 	$(BIN)/python -m pytest -c tests/benchmarks/pytest.ini tests/benchmarks $(ARGS)
+
+docs: $(DOCS)  ## Build the documentation into build/html and run the code in it; ARGS go to pytest
+	$(BIN)/python -m sphinx -W --keep-going -q -j auto -b html docs build/html
+	$(BIN)/python -m pytest -n auto --dist loadfile --doctest-modules $(PAGES) $(ARGS)
+
+PAGES = README.md CONTRIBUTING.md docs hipuq
 
 lint: $(DEV)  ## Check the format and the rules of the code
 	$(BIN)/ruff format --check .
@@ -75,6 +82,11 @@ $(DEV): pyproject.toml constraints.txt $(COMPILED) | $(BIN)/pip
 	@$(BIN)/python $(PIP) install -c constraints.txt -e ".[dev]"
 	@$(CHECK_KERNEL)
 	@touch $(RUNTIME) $@
+
+$(DOCS): $(DEV)
+	@echo "Installing what the documentation needs into $(VENV)"
+	@$(BIN)/python $(PIP) install -c constraints.txt -e ".[docs]"
+	@touch $@
 
 $(LOWEST_DEV): pyproject.toml constraints-lowest.txt $(COMPILED) | $(LOWEST)/bin/pip
 	@echo "Installing hipuq, what its tests need, and dask, lowest versions, into $(LOWEST)"

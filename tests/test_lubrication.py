@@ -269,7 +269,7 @@ def test_every_input_table_may_name_its_source():
 
 def test_the_page_is_right_as_written():
     """Its example runs and prints what it says; its study file is the same distribution."""
-    page = Path(__file__).parents[1] / "docs" / "lubrication.md"
+    page = Path(__file__).parents[1] / "docs" / "theory" / "lubrication.md"
     tried = doctest.testfile(str(page), module_relative=False, encoding="utf-8")
     assert tried.attempted > 8 and tried.failed == 0
     text = page.read_text(encoding="utf-8")

@@ -7,7 +7,7 @@ import numpy as np
 
 import hipuq
 
-PAGE = Path(__file__).parents[1] / "docs" / "scale.md"
+PAGE = Path(__file__).parents[1] / "docs" / "howto" / "long-runs.md"
 
 
 def blocks(text: str) -> list[str]:

@@ -76,7 +76,7 @@ def test_the_mixture_lies_between_its_regimes(tree):
 
 def test_the_recipes_of_the_docs_are_right(out, monkeypatch):
     monkeypatch.chdir(out.parents[1])
-    text = (ROOT / "docs" / "report.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "report.md").read_text(encoding="utf-8")
     names: dict = {}
     for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
         exec(block, names)

@@ -1,9 +1,9 @@
 #!/usr/bin/env python
-"""Make the figures and print the tables of docs/methods.md.
+"""Make the figures and print the tables of docs/gallery/method_comparison.md.
 
 hipuq run studies/method_comparison
-python docs/methods.py [results/method_comparison]
-python docs/methods.py --more
+python docs/scripts/methods.py [results/method_comparison]
+python docs/scripts/methods.py --more
 
 The first command makes the results that the second one reads; it takes 25 minutes on two cores, and goes on
 with --resume if it is cut off. The second takes seconds, the third eight minutes: it runs what the study
@@ -23,8 +23,8 @@ from hipuq import plots
 from hipuq.report.comparison import facts, remarks, tables
 from hipuq.report.table import Table
 
-FIGURES = Path(__file__).parent / "figures"
-REFERENCE = Path(__file__).parents[1] / "studies" / "method_comparison" / "reference.nc"
+FIGURES = Path(__file__).parents[1] / "figures"
+REFERENCE = Path(__file__).parents[2] / "studies" / "method_comparison" / "reference.nc"
 CLOSED_FORM = 0.4021698580326567
 """P of hoffmann, friction U(0, 0.8) and k3 scattered by 10 %."""
 

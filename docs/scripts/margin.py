@@ -1,7 +1,7 @@
 #!/usr/bin/env python
-"""Make the figure and print the tables of docs/margin.md.
+"""Make the figure and print the tables of docs/theory/margin.md.
 
-python docs/margin.py
+python docs/scripts/margin.py
 
 It takes about a minute.
 """
@@ -21,7 +21,7 @@ from hipuq.cea import solve
 from hipuq.cea.bounds import CERTIFICATE, DOUBLE, STRUCTURED
 from hipuq.plots.style import BLACK, BLUE, BORDER, LINES
 
-FIGURES = Path(__file__).parent / "figures"
+FIGURES = Path(__file__).parents[1] / "figures"
 PRESETS = ("oberst2016", "oberst2016-calibrated")
 DRAW = 5
 """Seed of the scattered ring of the figure."""

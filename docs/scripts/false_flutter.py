@@ -1,7 +1,7 @@
 #!/usr/bin/env python
-"""Make the figures and print the tables of docs/false-flutter.md.
+"""Make the figures and print the tables of docs/theory/false-flutter.md.
 
-python docs/false_flutter.py
+python docs/scripts/false_flutter.py
 
 It takes about 90 seconds. Numbers that come from plain eigenvalues are rounding errors made visible:
 another LAPACK gives others of the same size. Verdicts of hipuq should not change.
@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 import hipuq
 from hipuq.plots.style import BLUE, BORDER, GREEN, ORANGE, VERMILLION
 
-FIGURES = Path(__file__).parent / "figures"
+FIGURES = Path(__file__).parents[1] / "figures"
 PRESETS = ("oberst2016", "oberst2016-calibrated")
 COUNTS = (6, 7, 8, 9)
 POINTS = 2000

@@ -1,8 +1,8 @@
 #!/usr/bin/env python
-"""Make the figures and print the tables of docs/scatter.md.
+"""Make the figures and print the tables of docs/gallery/scatter.md.
 
 hipuq run studies/scatter
-python docs/scatter.py [results/scatter]
+python docs/scripts/scatter.py [results/scatter]
 
 The first command makes the results that the second one reads; it takes a minute on two cores, the second six.
 """
@@ -22,7 +22,7 @@ import hipuq
 from hipuq.intervals import wilson
 from hipuq.plots.style import BLUE, GREEN, PURPLE, VERMILLION
 
-FIGURES = Path(__file__).parent / "figures"
+FIGURES = Path(__file__).parents[1] / "figures"
 PRESET = "oberst2016"
 DAMPING = 0.01
 NORMAL = 1.959964
