@@ -7,7 +7,7 @@ import pytest
 from helpers import assert_same_bits, joined, pencils, random_pencils
 
 import hipuq
-from hipuq.cea import damping_ratio, solve
+from hipuq.cea import Pencils, damping_ratio, solve
 from hipuq.cea.bounds import CERTIFICATE, conditioned_eigenvalues
 from hipuq.errors import InputError
 
@@ -180,6 +180,24 @@ def test_bits_do_not_depend_on_the_batch_with_full_mass():
     mass = factor @ factor.transpose(0, 2, 1) + np.eye(4)
     case = replace(random_pencils(8, 20, 4, damped=True), mass=mass)
     assert_same_bits(solve(case), joined([solve(case.rows([i])) for i in range(20)]))
+
+
+@pytest.mark.parametrize("certify", ["never", "auto", "always"])
+def test_double_modes_of_a_symmetric_problem_stay_real_with_full_mass(certify):
+    """Without friction nothing flutters, and M^(-1/2) K M^(-1/2) must not be made unsymmetric by rounding."""
+    rng = np.random.default_rng(1)
+    shapes, roots = rng.normal(size=(50, 8, 8)), np.repeat(rng.uniform(1.0, 9.0, (50, 4)), 2, axis=1)
+    mass = shapes.transpose(0, 2, 1) @ shapes
+    stiffness = shapes.transpose(0, 2, 1) @ (roots[:, :, None] * shapes)
+    case = Pencils(
+        mass=(mass + mass.transpose(0, 2, 1)) / 2,
+        stiffness=(stiffness + stiffness.transpose(0, 2, 1)) / 2,
+        friction_stiffness=rng.normal(size=(50, 8, 8)),
+        friction=np.zeros(50),
+        damping=None,
+        mechanisms=np.zeros(50, np.intp),
+    )
+    assert (solve(case, certify=certify).any_unstable == 0).all()
 
 
 def test_error_bounds_do_not_depend_on_the_batch():

@@ -42,15 +42,15 @@ class Pencils:
         Number of rigid mechanisms: dimension of the null space that K0 + mu K1 has for every mu by
         construction. Floating point cannot find it, so the model declares it.
     filter_radius : float
-        Radius, relative to the norm, that was shown by exact arithmetic to hold the errors of
+        Radius, relative to the norm [1], that was shown by exact arithmetic to hold the errors of
         eigenvalues of this family of matrices, LAPACK's and the compiled kernel's, where no verdict is closer
-        to changing.
-        0, as for matrices of which nothing is known: every verdict needs condition numbers.
+        to changing. 0 for matrices of which nothing is known: every verdict then needs condition numbers.
 
     Raises
     ------
     InputError
-        If shapes do not fit, values are not finite, or M is not positive definite.
+        If shapes do not fit, values are not finite or above 1e140, masses of a diagonal M are not positive,
+        or mechanisms are not from 0 to n - 1.
     """
 
     mass: Array
@@ -125,6 +125,11 @@ class Pencils:
             A [1/s^2].
         damping : (s, n, n) array or None
             D [1/s].
+
+        Raises
+        ------
+        InputError
+            If a mass matrix is not positive definite.
         """
         stiffness = self.total_stiffness
         if self.mass.ndim == 2:
@@ -136,17 +141,23 @@ class Pencils:
             inverse = np.linalg.inv(np.linalg.cholesky(self.mass))
         except np.linalg.LinAlgError as error:
             raise InputError("mass matrix is not positive definite") from error
-        back = inverse.transpose(0, 2, 1)
-        damping = None if self.damping is None else inverse @ self.damping @ back
-        return inverse @ stiffness @ back, damping
+        damping = None if self.damping is None else _congruent(inverse, self.damping)
+        return _congruent(inverse, stiffness), damping
 
     def reduced_parts(self) -> tuple[Array, Array]:
         """Return ``L^-1 K0 L^-T`` and ``L^-1 K1 L^-T``, the parts of A = A0 + mu A1.
 
         Returns
         -------
-        constant, slope : (s, n, n) array
-            A0 and A1 [1/s^2].
+        constant : (s, n, n) array
+            A0 [1/s^2].
+        slope : (s, n, n) array
+            A1 [1/s^2].
+
+        Raises
+        ------
+        InputError
+            If a mass matrix is not positive definite.
         """
         none = np.zeros_like(self.friction_stiffness)
         parts = (
@@ -157,7 +168,18 @@ class Pencils:
         return constant, slope
 
     def rows(self, index: Any) -> Pencils:
-        """Return the pencils of the samples that `index` selects."""
+        """Return the pencils of the samples that `index` selects.
+
+        Parameters
+        ----------
+        index : (k,) array of int or bool, or slice
+            Which samples.
+
+        Returns
+        -------
+        Pencils
+            Of these samples, in the order of `index`.
+        """
         return Pencils(
             self.mass[index],
             self.stiffness[index],
@@ -167,3 +189,11 @@ class Pencils:
             self.mechanisms[index],
             self.filter_radius,
         )
+
+
+def _congruent(inverse: Array, matrices: Array) -> Array:
+    """Return ``X K X^T`` of a batch, symmetric to the last bit where K is."""
+    found = inverse @ matrices @ inverse.transpose(0, 2, 1)
+    symmetric = (matrices == matrices.transpose(0, 2, 1)).all(axis=(1, 2))
+    found[symmetric] = (found[symmetric] + found[symmetric].transpose(0, 2, 1)) / 2
+    return found
