@@ -118,6 +118,16 @@ def test_a_plain_function_is_a_model(monkeypatch):
     assert outcomes.attrs["model"] == "plain"
 
 
+def test_outputs_that_count_or_compare_may_be_made_from_the_samples():
+    """They carry the coordinate of their block with them, and there is more than one block."""
+    samples = xr.Dataset({"load": ("sample", np.linspace(0.0, 2.0, SIZE))}, {"sample": np.arange(SIZE)})
+    outcomes = hipuq.evaluate(
+        lambda part: xr.Dataset({"high": part["load"] > 1.5, "whole": part["load"].astype(int)}), samples
+    )
+    assert np.array_equal(outcomes["high"], samples["load"] > 1.5)
+    assert np.array_equal(outcomes["whole"], np.floor(samples["load"]))
+
+
 def test_outputs_may_have_dims_and_missing_values():
     """A verdict may be unknown; any other number that is missing is a failure."""
 

@@ -261,7 +261,12 @@ def _checked(call: Call, samples: xr.Dataset) -> xr.Dataset:
     books = [name for name, values in given.coords.items() if "sample" in values.dims and name not in made]
     if books:
         given = given.drop_vars(books)
-    whole_numbers = {name: _floating(values) for name, values in made.items() if _counts(name, values)}
+    # Without their coords too: what is assigned brings its own along.
+    whole_numbers = {
+        name: _floating(values.drop_vars(books, errors="ignore"))
+        for name, values in made.items()
+        if _counts(name, values)
+    }
     if whole_numbers:
         given = given.assign(whole_numbers)
     if call.layout is not None and (fault := call.layout.fault(given)):
