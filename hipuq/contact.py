@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from hipuq import schema
 from hipuq.errors import InputError
 
+CONTACT_PATTERNS = "contact_patterns"
+"""Their name in study files and in the descriptions of inputs."""
+
 LEVELS_MAXIMUM = 100_000
 """Most patterns that are written out one by one."""
 
@@ -33,7 +36,7 @@ class ContactPatterns:
     oscillators : int, default 9
         Number of oscillators N.
     weights : sequence of float, optional
-        Relative probabilities, one for each number in contact in the order of `in_contact`, or one
+        Relative probabilities [1], one for each number in contact in the order of `in_contact`, or one
         for each pattern in the order of the enumeration.
 
     Raises
@@ -44,8 +47,14 @@ class ContactPatterns:
     Examples
     --------
     >>> import hipuq
-    >>> hipuq.ContactPatterns(in_contact=(6, 7, 8, 9)).size
-    130
+    >>> patterns = hipuq.ContactPatterns(in_contact=(6, 7, 8, 9))
+    >>> patterns.size, patterns.sizes.tolist()
+    (130, [84, 36, 9, 1])
+    >>> patterns.patterns([1, 130]).astype(int)
+    array([[1, 1, 1, 1, 1, 1, 0, 0, 0],
+           [1, 1, 1, 1, 1, 1, 1, 1, 1]])
+    >>> dict(patterns.samples().sizes)
+    {'sample': 130, 'oscillator': 9}
     """
 
     in_contact: tuple[int, ...]
@@ -98,7 +107,7 @@ class ContactPatterns:
 
     @property
     def sizes(self) -> NDArray[np.int64]:
-        """Number of patterns for each number in contact."""
+        """Number of patterns for each number in contact, (numbers,), in the order of `in_contact`."""
         return np.array([math.comb(self.oscillators, count) for count in self.in_contact], np.int64)
 
     @property
@@ -117,6 +126,12 @@ class ContactPatterns:
         Returns
         -------
         (s, N) array of bool
+            Which of the N oscillators are in contact.
+
+        Raises
+        ------
+        InputError
+            If there is no pattern of a number.
         """
         number = np.asarray(index, dtype=np.int64) - 1
         if ((number < 0) | (number >= self.size)).any():
@@ -143,6 +158,7 @@ class ContactPatterns:
         Parameters
         ----------
         contact : (s, N) array of bool
+            Which of the N oscillators are in contact.
 
         Returns
         -------
@@ -164,7 +180,7 @@ class ContactPatterns:
 
     @property
     def weight(self) -> NDArray[np.float64]:
-        """Probability of each pattern, (size,)."""
+        """Probability of each pattern [1], (size,); more than `LEVELS_MAXIMUM` of them are an InputError."""
         if self.size > LEVELS_MAXIMUM:
             raise InputError(f"{self.size} patterns are too many to list, at most {LEVELS_MAXIMUM}")
         if self.weights is not None and len(self.weights) == self.size:
@@ -182,11 +198,12 @@ class ContactPatterns:
         Parameters
         ----------
         u : (s,) array
-            In [0, 1).
+            Probabilities [1], from 0 to below 1.
 
         Returns
         -------
         (s,) array of int
+            Pattern numbers, from 1.
         """
         points = np.asarray(u, dtype=np.float64)
         if self.weights is not None and len(self.weights) == self.size:
@@ -271,13 +288,30 @@ class ContactPatterns:
         return schema.stamp(samples, f"every contact pattern, {self.size} samples")
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the description that `from_dict` takes."""
+        """Return the description that `from_dict` takes.
+
+        Returns
+        -------
+        dict
+            JSON-able: ``in_contact``, ``oscillators``, and ``weights`` if there are any.
+        """
         data: dict[str, Any] = {"in_contact": list(self.in_contact), "oscillators": self.oscillators}
         return data if self.weights is None else data | {"weights": list(self.weights)}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> ContactPatterns:
-        """Return the patterns that `to_dict` describes."""
+        """Return the patterns that `to_dict` describes.
+
+        Parameters
+        ----------
+        data : mapping
+            As from `to_dict`; a key ``kind`` is ignored.
+
+        Returns
+        -------
+        ContactPatterns
+            The same patterns with the same weights.
+        """
         return cls(**{key: value for key, value in data.items() if key != "kind"})
 
 

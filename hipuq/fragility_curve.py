@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from hipuq import schema
 from hipuq.errors import InputError, SchemaError
-from hipuq.inputs import Inputs
 from hipuq.intervals import check_confidence, wilson
+from hipuq.uncertain import only_discrete
 
 Array = NDArray[np.float64]
 
@@ -22,19 +22,19 @@ def fragility(outcomes: xr.Dataset, friction: ArrayLike, *, confidence: float = 
     Parameters
     ----------
     outcomes : Dataset
-        Of a model whose friction is integrated, with ``interval``; as from `evaluate`.
+        Of a model whose friction is integrated, with ``interval`` and ``status``, as from `evaluate`.
     friction : (k,) array
         Where to give it, inside the range that was swept [1].
     confidence : float, default 0.95
-        Level of the intervals, of Wilson; samples of a stratified design count by their weights.
+        Level of the intervals [1], of Wilson; samples of a stratified design count by their weights.
 
     Returns
     -------
     Dataset
-        ``probability``, ``probability_low``, ``probability_high`` and ``known`` over ``friction``. A
-        sample that is undecided counts as stable in the lower limit and as unstable in the upper one.
-        Where every level of a discrete input comes once and nothing else is uncertain, limits are
-        bounds by what is unknown alone.
+        ``probability``, ``probability_low``, ``probability_high`` [1] over ``friction`` [1], and ``known``,
+        the number of samples that are decided. A sample that is undecided counts as stable in the lower limit
+        and as unstable in the upper one. Where every level of a discrete input comes once and nothing else is
+        uncertain, limits are bounds by what is unknown alone.
 
     Raises
     ------
@@ -42,6 +42,19 @@ def fragility(outcomes: xr.Dataset, friction: ArrayLike, *, confidence: float = 
         If the outcomes have no intervals.
     InputError
         If a friction is outside the range that was swept, or the confidence is not one.
+
+    Examples
+    --------
+    >>> import chaospy as cp
+    >>> import hipuq
+    >>> model = hipuq.models.two_dof("hoffmann2002")
+    >>> exact = hipuq.integrate_friction(model, cp.Uniform(0.0, 1.0))
+    >>> inputs = exact.inputs(k3=hipuq.relative(cp.Uniform(-0.1, 0.1)))
+    >>> samples = hipuq.design("monte_carlo", inputs, n=200, rng=1)
+    >>> outcomes = hipuq.evaluate(exact, samples)
+    >>> curve = hipuq.fragility(outcomes, [0.4, 0.45, 0.5])
+    >>> curve["probability"].values.round(3)
+    array([0.14 , 0.425, 0.695])
     """
     confidence = check_confidence(confidence)
     if "interval" not in outcomes.variables or "range" not in outcomes["interval"].attrs:
@@ -117,9 +130,8 @@ def enumerated(outcomes: xr.Dataset) -> bool:
     """Say whether outcomes are those of every level of a discrete input alike, so that none was drawn."""
     if "weight" not in outcomes.coords or not outcomes.attrs.get("inputs"):
         return False
-    inputs = Inputs.from_json(str(outcomes.attrs["inputs"]))
     times = float(outcomes["weight"].sum())
-    return bool(abs(times - round(times)) < 1e-9 and set(inputs) <= set(inputs.discrete))
+    return bool(abs(times - round(times)) < 1e-9 and only_discrete(str(outcomes.attrs["inputs"])))
 
 
 def _covered(intervals: Array, weight: Array, grid: Array, swept: tuple[float, float]) -> Array:

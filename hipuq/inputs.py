@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class Inputs(Mapping[str, Input]):
-    """Frozen mapping: name of an uncertain parameter -> its distribution.
+    """Frozen mapping from the names of uncertain parameters to their distributions.
 
     Made by ``model.inputs(...)``, which knows nominal values and lengths, or directly for a plain
     function as a model.
@@ -40,8 +40,11 @@ class Inputs(Mapping[str, Input]):
     --------
     >>> import chaospy as cp
     >>> import hipuq
-    >>> hipuq.Inputs(x1=cp.Uniform(0, 1), x2=cp.Normal(0, 2)).dimension
-    2
+    >>> inputs = hipuq.Inputs(x1=cp.Uniform(0, 1), x2=cp.Normal(0, 2))
+    >>> inputs.dimension, list(inputs)
+    (2, ['x1', 'x2'])
+    >>> inputs.samples([[0.5, 0.5], [0.1, 0.975]])["x2"].values.round(4)
+    array([0.    , 3.9199])
     """
 
     def __init__(self, /, **distributions: object) -> None:
@@ -50,7 +53,25 @@ class Inputs(Mapping[str, Input]):
 
     @classmethod
     def around(cls, distributions: Mapping[str, object], nominal: Mapping[str, Nominal]) -> Inputs:
-        """Return inputs of a model that knows its nominal values and lengths."""
+        """Return inputs of a model that knows its nominal values and lengths.
+
+        Parameters
+        ----------
+        distributions : mapping
+            Parameter name -> a distribution, `relative`, `shift` or `ContactPatterns`.
+        nominal : mapping
+            Parameter name -> its nominal value and the dims of its elements.
+
+        Returns
+        -------
+        Inputs
+            In the order of `distributions`.
+
+        Raises
+        ------
+        InputError
+            If there is no distribution, or one cannot be used for its parameter.
+        """
         inputs = cls.__new__(cls)
         inputs._entries = {
             name: as_input(name, value, nominal[name]) for name, value in distributions.items()
@@ -135,8 +156,21 @@ class Inputs(Mapping[str, Input]):
     def levels(self, name: str) -> xr.Dataset:
         """Return the levels of a discrete input: its dim, coords and ``weight``.
 
+        Parameters
+        ----------
+        name : str
+            Name of the input.
+
+        Returns
+        -------
+        Dataset
+            As from `ContactPatterns.levels`: ``contact(pattern, oscillator)`` under the input's name,
+            ``weight(pattern)``, and the coord ``in_contact(pattern)``.
+
         Raises
         ------
+        UnknownNameError
+            If there is no such input.
         InputError
             If the input is not discrete.
         """
@@ -146,7 +180,23 @@ class Inputs(Mapping[str, Input]):
         return distribution.levels(name)
 
     def without(self, name: str) -> Inputs:
-        """Return these inputs without one of them; it may leave none."""
+        """Return these inputs without one of them; it may leave none.
+
+        Parameters
+        ----------
+        name : str
+            Name of the input to leave out.
+
+        Returns
+        -------
+        Inputs
+            The others, in the same order.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such input.
+        """
         self[name]
         rest = Inputs.__new__(Inputs)
         rest._entries = {key: entry for key, entry in self._entries.items() if key != name}
@@ -158,12 +208,18 @@ class Inputs(Mapping[str, Input]):
         Parameters
         ----------
         u : (s, dimension) array
-            In [0, 1], columns in the order of `groups`.
+            Probabilities from 0 to 1 [1], columns in the order of `groups`.
 
         Returns
         -------
         Dataset
-            One variable for each input, over ``sample`` and its element dim.
+            One variable for each input, over ``sample`` and its element dim, in the units of the schema; a
+            name that it does not have keeps the unit of its distribution.
+
+        Raises
+        ------
+        InputError
+            If the points do not have as many columns as there are draws.
         """
         points = np.clip(np.asarray(u, dtype=np.float64), LOWEST, HIGHEST)
         if points.ndim != 2 or points.shape[1] != self.dimension:
@@ -176,12 +232,13 @@ class Inputs(Mapping[str, Input]):
         Parameters
         ----------
         draws : (s, dimension) array
-            Values of the distributions, columns in the order of `groups`.
+            Values of the distributions, columns in the order of `groups`: [1] of a relative one, in the
+            unit of the parameter of others.
 
         Returns
         -------
         Dataset
-            As of `samples`.
+            As from `samples`: one variable for each input, over ``sample`` and its element dim.
 
         Raises
         ------
@@ -198,11 +255,13 @@ class Inputs(Mapping[str, Input]):
         Parameters
         ----------
         samples : Dataset
-            A variable for each input; others are ignored.
+            A variable for each input, over ``sample``, and its element dim if it has one; others are ignored.
 
         Returns
         -------
         (s, dimension) array
+            Values of the distributions, columns in the order of `groups`: [1] of a relative one, in the
+            unit of the parameter of others.
 
         Raises
         ------
@@ -238,12 +297,28 @@ class Inputs(Mapping[str, Input]):
             start += entry.columns
 
     def to_json(self) -> str:
-        """Return a JSON description, enough to rebuild the inputs."""
+        """Return a JSON description, enough to rebuild the inputs.
+
+        Returns
+        -------
+        str
+            JSON, as `from_json` takes it.
+        """
         return json.dumps({name: entry.to_dict() for name, entry in self._entries.items()})
 
     @classmethod
     def from_json(cls, text: str) -> Inputs:
         """Return the inputs that `to_json` describes.
+
+        Parameters
+        ----------
+        text : str
+            JSON, such as the attribute ``inputs`` of samples, outcomes and results.
+
+        Returns
+        -------
+        Inputs
+            Equal to those described.
 
         Raises
         ------

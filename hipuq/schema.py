@@ -79,8 +79,8 @@ PARAMETERS: dict[str, Variable] = {
     "angle_2": Variable("angle of spring 2", "deg"),
     "frequency_1": Variable("natural frequency 1", "Hz"),
     "frequency_2": Variable("natural frequency 2", "Hz"),
-    "damping_1": Variable("damping ratio 1"),
-    "damping_2": Variable("damping ratio 2"),
+    "damping_1": Variable("relative damping 1 (twice the damping ratio)"),
+    "damping_2": Variable("relative damping 2 (twice the damping ratio)"),
 }
 """Parameters of the models that come with hipuq."""
 
@@ -93,7 +93,7 @@ OUTCOMES: dict[str, Variable] = {
     "margin": Variable("stability margin (negative: unstable)", limit_state=0.0),
     "mechanisms": Variable("number of rigid mechanisms"),
 }
-"""Outcomes of a complex eigenvalue analysis, see :mod:`hipuq.cea`."""
+"""Outcomes of a complex eigenvalue analysis, see `hipuq.cea`."""
 
 INTEGRATED: dict[str, Variable] = {
     "probability": Variable("probability of instability over friction", role=PROBABILITY),
@@ -110,7 +110,7 @@ INTEGRATED: dict[str, Variable] = {
     "interval": Variable("ends of an unstable interval of friction", dims=("sample", "interval", "bound")),
     "interval_count": Variable("number of unstable intervals of friction"),
 }
-"""Outcomes of a model whose friction is integrated, see :mod:`hipuq.friction`."""
+"""Outcomes of a model whose friction is integrated, see `hipuq.friction`."""
 
 STATUS = {"ok": 0, "undecided": 1, "failed": 2}
 """Flags of the outcome variable ``status``."""

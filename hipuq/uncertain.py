@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from hipuq import schema
-from hipuq.contact import ContactPatterns
+from hipuq.contact import CONTACT_PATTERNS, ContactPatterns
 from hipuq.distributions import Distribution, as_distribution, from_description
 from hipuq.errors import InputError
 from hipuq.variation import UNWARNED, Nominal, Variation
@@ -45,6 +46,8 @@ class Input:
         Nominal value of a relative or shifted one; its shape for an absolute one.
     each : bool
         Whether each element has a draw of its own.
+    labels : mapping or None
+        ``long_name`` and ``units`` of a parameter that the schema does not know.
     """
 
     name: str
@@ -53,6 +56,7 @@ class Input:
     dims: tuple[str, ...]
     nominal: Array
     each: bool
+    labels: Mapping[str, Any] | None = None
 
     @property
     def columns(self) -> int:
@@ -93,7 +97,7 @@ class Input:
         """Return the physical values that draws (samples, columns) stand for."""
         values = self._applied(draws)
         known = schema.PARAMETERS.get(self.name)
-        attrs = known.attrs if known else {"long_name": self.name, "units": ""}
+        attrs = known.attrs if known else self.labels or {"long_name": self.name, "units": ""}
         coords = {
             dim: schema.index(dim, size)
             for dim, size in zip(self.dims, self.nominal.shape, strict=True)
@@ -165,14 +169,15 @@ class Input:
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-able description."""
         if isinstance(self.distribution, ContactPatterns):
-            return {"how": "contact_patterns", **self.distribution.to_dict()}
-        return {
+            return {"how": CONTACT_PATTERNS, **self.distribution.to_dict()}
+        described: dict[str, Any] = {
             "how": self.how,
             "distribution": dict(self.distribution.description),
             "dims": list(self.dims),
             "nominal": self.nominal.tolist(),
             "each": self.each,
         }
+        return described | ({"labels": dict(self.labels)} if self.labels else {})
 
     @classmethod
     @UNWARNED
@@ -185,11 +190,11 @@ class Input:
             If something in the description cannot be used.
         """
         how = data["how"]
-        if how == "contact_patterns":
+        if how == CONTACT_PATTERNS:
             rest = {key: value for key, value in data.items() if key != "how"}
             return _contact(name, ContactPatterns(**rest))
         if how not in HOW:
-            raise InputError(f"{name} is {how!r}: it must be one of {', '.join(HOW)}, or contact_patterns")
+            raise InputError(f"{name} is {how!r}: it must be one of {', '.join(HOW)}, or {CONTACT_PATTERNS}")
         dims, each = data["dims"], data["each"]
         if not isinstance(dims, list) or not all(isinstance(dim, str) and dim for dim in dims):
             raise InputError(f"dims of {name} are {dims!r}: they must be a list of names")
@@ -198,7 +203,37 @@ class Input:
             raise InputError(f"nominal of {name} has {nominal.ndim} dims, and {len(dims)} names of them")
         if not isinstance(each, bool) or (each and (how == "absolute" or not dims)):
             raise InputError(f"each of {name} is {each!r}: only a change of elements has a draw for each")
-        return _checked(cls(name, from_description(data["distribution"]), how, tuple(dims), nominal, each))
+        labels = data.get("labels")
+        if labels is not None and not (
+            isinstance(labels, dict) and all(isinstance(text, str) for text in labels.values())
+        ):
+            raise InputError(f"labels of {name} are {labels!r}: they must be texts by name")
+        distribution = from_description(data["distribution"])
+        return _checked(cls(name, distribution, how, tuple(dims), nominal, each, labels))
+
+
+def only_discrete(text: str) -> bool:
+    """Say whether a description of inputs has discrete ones alone; it may hold what cannot be rebuilt.
+
+    Parameters
+    ----------
+    text : str
+        As from `hipuq.Inputs.to_json`.
+
+    Returns
+    -------
+    bool
+        Also true where there are none.
+
+    Raises
+    ------
+    InputError
+        If the text is not such a description.
+    """
+    try:
+        return all(entry["how"] == CONTACT_PATTERNS for entry in json.loads(text).values())
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        raise InputError(f"not a description of inputs: {error}") from error
 
 
 def _numbers(name: str, nominal: object) -> Array:
@@ -267,10 +302,12 @@ def as_input(name: str, value: object, known: Nominal | None) -> Input:
                 f"{len(known.values)}: give ContactPatterns(..., oscillators={len(known.values)})"
             )
         return _contact(name, value)
+    own = known.variable if known and name not in schema.PARAMETERS else None
+    labels = own.attrs if own else None
     if not isinstance(value, Variation):
         shape = known.values if known else np.zeros(())
         dims = known.dims if known else ()
-        return _checked(Input(name, as_distribution(value, name), "absolute", dims, shape, False))
+        return _checked(Input(name, as_distribution(value, name), "absolute", dims, shape, False, labels))
     if value.nominal is None and known is None:
         raise InputError(f"{name} is {value.how} to a nominal value that nobody knows: give nominal=")
     nominal = known.values if known and value.nominal is None else _numbers(name, value.nominal)
@@ -284,4 +321,5 @@ def as_input(name: str, value: object, known: Nominal | None) -> Input:
     if value.each is not None and (value.each,) != dims:
         allowed = f"each={dims[0]!r}" if dims else "no each, it is one number"
         raise InputError(f"each is {value.each!r} for {name}: allowed is {allowed}")
-    return _checked(Input(name, value.distribution, value.how, dims, nominal, value.each is not None))
+    each = value.each is not None
+    return _checked(Input(name, value.distribution, value.how, dims, nominal, each, labels))

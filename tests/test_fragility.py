@@ -78,6 +78,26 @@ def test_every_pattern_once_has_no_sampling_error():
     assert float(at["probability"][0]) == pytest.approx(outcomes["weight"].values @ first, abs=1e-12)
 
 
+class Ramp:
+    """A distribution of a user's own, which no description rebuilds."""
+
+    def ppf(self, u):
+        return 1.0 + 0.1 * np.sqrt(u)
+
+
+def test_a_distribution_of_ones_own_beside_contact_patterns_is_drawn():
+    model = hipuq.integrate_friction(hipuq.models.ring("oberst2016"), cp.Uniform(0.0, 0.1))
+    inputs = model.inputs(
+        contact=hipuq.ContactPatterns(in_contact=9),
+        contact_stiffness=hipuq.relative(Ramp(), each="oscillator"),
+    )
+    samples = hipuq.design("monte_carlo", inputs, n=8, rng=0, stratify="contact")
+    outcomes = hipuq.evaluate(model, samples, keep=["onset", "interval"], progress=False)
+    curve = hipuq.fragility(outcomes, [0.02, 0.04])
+    assert curve.attrs["confidence"] == 0.95
+    assert (curve["probability_low"] < curve["probability_high"]).all()
+
+
 @pytest.mark.parametrize(
     "grid", [[0.5, 0.4], [-0.1, 0.5], [0.5, 1.1], [0.5, np.nan], [0.5, 0.5], [[0.1, 0.2]]]
 )

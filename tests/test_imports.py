@@ -143,6 +143,9 @@ def test_registries_agree_with_their_folders():
     assert {path.stem for path in (PACKAGE / "models").glob("*.py")} - {
         "base",
         "blocks",
+        "damping",
+        "matrices",
+        "matrix_input",
         "onset",
         "outcomes",
         "parameter",

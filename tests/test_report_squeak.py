@@ -83,7 +83,7 @@ def test_damping_of_a_ring_in_words(changes, inputs, said):
 
 def test_damping_of_other_models_in_words():
     hulten = run(hipuq.models.two_dof("hulten", damping_1=0.02), friction=cp.Uniform(0, 0.4))
-    assert damping_words(hulten) == "damping ratio 1 of 2 %"
+    assert damping_words(hulten) == "relative damping 1 (twice the damping ratio) of 2 %"
     none = run(hipuq.models.two_dof(), friction=cp.Uniform(0, 0.4))
     assert damping_words(none) == at_damping(none) == ""
     assert damping_words(results(0.5, 0.4, 0.6)) == ""

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from hipuq.models import mode_coupling, oscillator_ring
 from hipuq.models.base import CEAModel
+from hipuq.models.matrices import from_matrices
 from hipuq.models.mode_coupling import two_dof
 from hipuq.models.onset import unstable_friction
 from hipuq.models.oscillator_ring import ring
@@ -31,6 +32,7 @@ __all__ = [
     "PRESETS",
     "CEAModel",
     "Parameter",
+    "from_matrices",
     "onset_sensitivity",
     "ring",
     "two_dof",

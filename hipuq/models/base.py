@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from hipuq import schema
 from hipuq.cea import ALWAYS, AUTO, NEVER, CompactPencils, Pencils, mode_shapes, solve
 from hipuq.compiled.binding import kernel
-from hipuq.errors import InputError, SchemaError, check_name
+from hipuq.errors import InputError, check_name
 from hipuq.inputs import Inputs
 from hipuq.models.outcomes import labelled_outcomes
 from hipuq.models.parameter import Parameter
@@ -39,26 +39,38 @@ class CEAModel(ABC):
 
     A subclass gives `name`, `parameters`, `dofs` and `assemble`; all else is here.
 
-    Attributes
+    Parameters
     ----------
     preset : str
         The published set of nominal values.
-    growth_threshold : float
-        Growth rate above which a mode counts as unstable [1/s].
-    certify : str
-        When verdicts go beyond double precision: ``"auto"``, ``"always"``, ``"never"``.
     parameters : mapping
-        Name -> `Parameter`, all known to the schema.
+        Name -> `Parameter`; the schema, or the parameter itself, says what the name means.
+    growth_threshold : float, default 0
+        Growth rate above which a mode counts as unstable [1/s].
+    certify : str, default "auto"
+        When verdicts go beyond double precision: ``"auto"``, ``"always"``, ``"never"``.
+
+    Attributes
+    ----------
+    name : str
+        Of the kind of model.
     block : int
         Samples that it takes at a time, at most: enough to forget the cost of a call.
     outcomes : tuple of str
         Names of the outcomes that a call can give.
     limits : tuple of str
         What its results do not tell, a sentence each without a full stop.
+
+    Raises
+    ------
+    InputError
+        If the threshold or a nominal value is not allowed, or nobody says what a parameter is.
+    UnknownNameError
+        If there is no such way to certify.
     """
 
     name: ClassVar[str]
-    block: ClassVar[int] = 4096
+    block: int = 4096
     limits: ClassVar[tuple[str, ...]] = LINEAR
     outcomes: ClassVar[tuple[str, ...]] = (*schema.OUTCOMES, "status", "decided_by")
 
@@ -80,6 +92,7 @@ class CEAModel(ABC):
         self.parameters = dict(parameters)
         self.growth_threshold = float(growth_threshold)
         for name, parameter in self.parameters.items():
+            parameter.described(name)
             parameter.check(name, parameter.nominal[None])
 
     @property
@@ -94,11 +107,12 @@ class CEAModel(ABC):
         Parameters
         ----------
         values : mapping
-            Every parameter, (s,) or (s, size), in the units of the schema.
+            Every parameter, (s,) or (s, size), in the units of its variable.
 
         Returns
         -------
         Pencils
+            Of s samples.
         """
 
     def compact(self, values: Mapping[str, Array]) -> CompactPencils | None:
@@ -110,12 +124,12 @@ class CEAModel(ABC):
         Parameters
         ----------
         values : mapping
-            As `assemble`.
+            Every parameter, (s,) or (s, size), in the units of its variable.
 
         Returns
         -------
         CompactPencils or None
-            None, as here, where the model does not give them for these values.
+            Of s samples; None, as here, where the model does not give them for these values.
         """
         return None
 
@@ -147,6 +161,7 @@ class CEAModel(ABC):
         Returns
         -------
         Inputs
+            What is uncertain; the rest keeps its nominal value.
 
         Raises
         ------
@@ -154,7 +169,7 @@ class CEAModel(ABC):
             If the model has no such parameter.
         """
         nominal = {
-            name: Nominal(parameter.nominal, schema.PARAMETERS[name].dims[1:])
+            name: Nominal(parameter.nominal, parameter.described(name).dims[1:], parameter.described(name))
             for name, parameter in self.parameters.items()
         }
         for name in distributions:
@@ -174,6 +189,13 @@ class CEAModel(ABC):
         -------
         Dataset
             Over ``sample``, one variable for each parameter changed; valid samples.
+
+        Raises
+        ------
+        UnknownNameError
+            If the model has no such parameter.
+        InputError
+            If a value has another shape than the parameter.
         """
         arrays = {
             check_name("parameter", name, self.parameters): np.asarray(value)
@@ -182,7 +204,8 @@ class CEAModel(ABC):
         size = max((len(a) for n, a in arrays.items() if a.ndim > self.parameters[n].nominal.ndim), default=1)
         data: dict[str, Any] = {}
         for name, array in arrays.items():
-            variable, shape = schema.PARAMETERS[name], self.parameters[name].nominal.shape
+            parameter = self.parameters[name]
+            variable, shape = parameter.described(name), parameter.nominal.shape
             try:
                 values = np.broadcast_to(array, (size, *shape)).copy()
             except ValueError:
@@ -207,6 +230,7 @@ class CEAModel(ABC):
         Returns
         -------
         Pencils
+            Of all samples.
 
         Raises
         ------
@@ -230,7 +254,7 @@ class CEAModel(ABC):
         Returns
         -------
         dict of str to array
-            (s,) or (s, size), in the units of the schema.
+            (s,) or (s, size), in the units of the parameter.
 
         Raises
         ------
@@ -239,7 +263,7 @@ class CEAModel(ABC):
         """
         size = schema.check_samples(samples, self.parameters)
         return {
-            name: self._values(name, samples)
+            name: parameter.values(name, samples)
             if name in samples
             else np.broadcast_to(parameter.nominal, (size, *parameter.nominal.shape))
             for name, parameter in self.parameters.items()
@@ -248,6 +272,11 @@ class CEAModel(ABC):
     def check(self, samples: xr.Dataset) -> None:
         """Check all samples at once, so that an error names the sample by its place in the whole.
 
+        Parameters
+        ----------
+        samples : Dataset
+            Parameters over ``sample``.
+
         Raises
         ------
         UnknownNameError, SchemaError, InputError
@@ -255,29 +284,7 @@ class CEAModel(ABC):
         """
         schema.check_samples(samples, self.parameters)
         for name in samples.data_vars:
-            self._values(str(name), samples)
-
-    def _values(self, name: str, samples: xr.Dataset) -> Array:
-        """Return the checked values of a parameter, (s,) or (s, size)."""
-        parameter = self.parameters[name]
-        given, dims = samples[name], schema.PARAMETERS[name].dims
-        shape = (samples.sizes["sample"], *parameter.nominal.shape)
-        if set(given.dims) != set(dims) or given.transpose(*dims).shape != shape:
-            raise SchemaError(
-                f"{name} has the shape {given.shape}, dims {given.dims}: it needs {shape}, dims {dims}"
-            )
-        given = given.transpose(*dims)
-        for dim in dims[1:]:
-            if dim in given.coords:
-                labels, numbers = given[dim].values, np.arange(1, given.sizes[dim] + 1)
-                if np.array_equal(labels, numbers):
-                    continue
-                if not np.array_equal(np.sort(labels), numbers):
-                    raise SchemaError(f"{dim} of {name} is labelled {labels}: it needs {numbers}")
-                given = given.sortby(dim)
-        values = np.ascontiguousarray(given.values, dtype=np.float64)
-        parameter.check(name, values)
-        return values
+            self.parameters[str(name)].values(str(name), samples)
 
     def __call__(self, samples: xr.Dataset, keep: Iterable[str] | None = None) -> xr.Dataset:
         """Return the outcomes of the samples.
@@ -304,6 +311,11 @@ class CEAModel(ABC):
 
         The growing mode of a coalesced pair (i, i + 1) is i + 1, so flutter of mode j is always
         that of the pair (j - 1, j).
+
+        Returns
+        -------
+        dict
+            ``mode``, the numbers from 1, and ``pair``, its modes as text.
         """
         pairs = ["1", *(f"{j - 1}-{j}" for j in range(2, self.dofs + 1))]
         return {

@@ -43,7 +43,7 @@ PRESETS: dict[str, dict[str, float]] = {
         "damping_2": 0.0,
     },
 }
-"""Nominal values: unit mass, stiffness [N/m], angles [deg], frequencies [Hz], damping ratios [1]."""
+"""Nominal values: unit mass, stiffness [N/m], angles [deg], frequencies [Hz], damping c / (m w) [1]."""
 
 LIMITS = ("Two modes show how friction couples them; they stand for no implant",)
 """Limits of both models."""
@@ -69,11 +69,13 @@ class Hoffmann(CEAModel):
         Parameters
         ----------
         values : mapping
-            ``friction``, ``k1``, ``k2``, ``k3``, ``angle_1``, ``angle_2``, each (s,).
+            ``friction``, ``k1``, ``k2``, ``k3``, ``angle_1``, ``angle_2``, each (s,), in the units of the
+            schema.
 
         Returns
         -------
         Pencils
+            Of s samples with 2 degrees of freedom.
         """
         size = len(values["k1"])
         stiffness = np.zeros((size, 2, 2))
@@ -106,11 +108,13 @@ class Hulten(CEAModel):
         Parameters
         ----------
         values : mapping
-            ``friction``, ``frequency_1``, ``frequency_2``, ``damping_1``, ``damping_2``, each (s,).
+            ``friction``, ``frequency_1``, ``frequency_2``, ``damping_1``, ``damping_2``, each (s,), in the
+            units of the schema.
 
         Returns
         -------
         Pencils
+            Of s samples with 2 degrees of freedom.
         """
         w1, w2 = (2 * np.pi * values[name] for name in ("frequency_1", "frequency_2"))
         size = len(w1)
@@ -142,23 +146,26 @@ def two_dof(
     certify: str = "auto",
     **nominal: float,
 ) -> CEAModel:
-    """Return a mode-coupling model with two degrees of freedom.
+    """Return a mode-coupling model with two degrees of freedom, whose onset is known in closed form.
 
     Parameters
     ----------
     preset : str
-        ``"hoffmann2002"`` or ``"hulten"``.
+        ``"hoffmann2002"``: a unit mass on two springs and a contact spring (Hoffmann et al., Mech. Res.
+        Commun. 29 (2002) 197). ``"hulten"``: two modes coupled by friction, with damping (Hulten, SAE 932965
+        (1993), as used by Sinou and Jezequel, Eur. J. Mech. A 26 (2007) 106).
     growth_threshold : float, default 0
         Growth rate above which a mode counts as unstable [1/s].
     certify : str, default "auto"
         ``"auto"``: verdicts that double precision leaves open are decided by the structured solver
         or by exact arithmetic. ``"always"``: all by exact arithmetic. ``"never"``: they stay unknown.
     **nominal
-        Other nominal values of the preset's parameters.
+        Other nominal values of the preset's parameters, one number each, in the units of the schema.
 
     Returns
     -------
     CEAModel
+        Samples in, outcomes out.
 
     Raises
     ------
@@ -170,8 +177,12 @@ def two_dof(
     Examples
     --------
     >>> import hipuq
-    >>> list(hipuq.models.two_dof("hulten").parameters)
+    >>> model = hipuq.models.two_dof("hulten")
+    >>> list(model.parameters)
     ['friction', 'frequency_1', 'frequency_2', 'damping_1', 'damping_2']
+    >>> found = hipuq.unstable_friction(model, upper=1.0)
+    >>> found["start"].values.round(6)  # 7 / 24
+    array([0.291667])
     """
     check_name("preset of two_dof", preset, PRESETS)
     values = dict(PRESETS[preset])

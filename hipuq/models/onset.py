@@ -64,7 +64,7 @@ def unstable_friction(
     >>> import hipuq
     >>> model = hipuq.models.two_dof("hoffmann2002")
     >>> hipuq.unstable_friction(model, upper=0.8)["friction"].values.round(12)
-    array([0.472377492973])
+    array([0.47237749])
     """
     if not (np.isfinite([lower, upper]).all() and 0 <= lower < upper):
         raise InputError(f"the range of friction is {lower} to {upper}: it must ascend from 0 or above")

@@ -26,6 +26,7 @@ from hipuq.compiled.angles import cosine_and_sine
 from hipuq.errors import InputError, check_name
 from hipuq.models.base import LINEAR, CEAModel
 from hipuq.models.blocks import at_blocks, dyads, sample_last
+from hipuq.models.damping import DAMPING, damping_matrices
 from hipuq.models.parameter import Parameter
 from hipuq.sampling import check_count
 
@@ -55,9 +56,6 @@ rings of up to nine oscillators judged by exact arithmetic (nominal, scattered, 
 FILTER_OSCILLATORS = 9
 """Largest ring for which the filter is validated with that margin."""
 
-DAMPING = ("damping_ratio", "mass_damping", "stiffness_damping")
-"""Parameters that make a sample damped where they are not zero."""
-
 LIMITS = (
     "The ring is a planar model of a mechanism, the coupling of modes by friction: it is not the model of "
     "one "
@@ -78,7 +76,13 @@ LIMITS = (
 
 
 class OscillatorRing(CEAModel):
-    """Ring of N oscillators with 2 N degrees of freedom (x1, y1, ..., xN, yN). Made by `ring`."""
+    """Ring of N oscillators with 2 N degrees of freedom (x1, y1, ..., xN, yN). Made by `ring`.
+
+    Attributes
+    ----------
+    friction_follows : bool
+        Whether the friction direction stays perpendicular to the contact direction.
+    """
 
     name = "ring"
     limits: ClassVar[tuple[str, ...]] = (*LIMITS, *LINEAR)
@@ -106,6 +110,16 @@ class OscillatorRing(CEAModel):
         """Return the values of every parameter, see `CEAModel.values`.
 
         ``friction_angle`` follows ``contact_angle`` + 90 deg unless the samples hold it.
+
+        Parameters
+        ----------
+        samples : Dataset
+            Parameters over ``sample``.
+
+        Returns
+        -------
+        dict of str to array
+            (s,), (s, N) or (s, N + 1), in the units of the schema.
         """
         values = super().values(samples)
         if "contact_angle" in samples and "friction_angle" not in samples and self.friction_follows:
@@ -113,7 +127,6 @@ class OscillatorRing(CEAModel):
         return values
 
     friction_follows: bool = True
-    """Whether the friction direction stays perpendicular to the contact direction."""
 
     def mode_shapes(self, sample: xr.Dataset) -> xr.Dataset:
         """Return the mode shapes and energies of one sample.
@@ -154,14 +167,15 @@ class OscillatorRing(CEAModel):
         Parameters
         ----------
         values : mapping
-            Every parameter of the ring, (s,), (s, N) or (s, N + 1).
+            Every parameter of the ring, (s,), (s, N) or (s, N + 1), in the units of the schema.
 
         Returns
         -------
         Pencils
+            Of s samples with 2 N degrees of freedom.
         """
         pencils = self.entries(values).rows()
-        return replace(pencils, damping=_damping(pencils.mass, pencils.stiffness, values))
+        return replace(pencils, damping=damping_matrices(pencils.mass, pencils.stiffness, values))
 
     def compact(self, values: Mapping[str, Array]) -> CompactPencils | None:
         """Return the undamped matrices of a batch by their entries, None if any sample is damped.
@@ -169,11 +183,12 @@ class OscillatorRing(CEAModel):
         Parameters
         ----------
         values : mapping
-            As `assemble`.
+            Every parameter of the ring, (s,), (s, N) or (s, N + 1), in the units of the schema.
 
         Returns
         -------
         CompactPencils or None
+            The matrices of `assemble`, to the last bit.
         """
         return None if any(values[name].any() for name in DAMPING) else self.entries(values)
 
@@ -183,11 +198,12 @@ class OscillatorRing(CEAModel):
         Parameters
         ----------
         values : mapping
-            As `assemble`.
+            Every parameter of the ring, (s,), (s, N) or (s, N + 1), in the units of the schema.
 
         Returns
         -------
         CompactPencils
+            Of s samples with 2 N degrees of freedom.
         """
         own = {name: sample_last(values[name]) for name in values if values[name].ndim == 2}
         count = self.oscillators
@@ -218,29 +234,6 @@ class OscillatorRing(CEAModel):
         )
 
 
-def _damping(mass: Array, stiffness: Array, values: Mapping[str, Array]) -> Array | None:
-    """Return the damping matrices, None if no sample has any; (s, n, n).
-
-    Modal damping on the frictionless modes, ``C = 2 z M^(1/2) S M^(1/2)`` with S the root of
-    ``M^(-1/2) K0 M^(-1/2)``, and Rayleigh damping ``a M + b K0``.
-    """
-    ratio, alpha, beta = (values[name] for name in DAMPING)
-    if not (ratio.any() or alpha.any() or beta.any()):
-        return None
-    damping: Array = beta[:, None, None] * stiffness
-    diagonal = np.arange(mass.shape[1])
-    damping[:, diagonal, diagonal] += alpha[:, None] * mass
-    modal = np.flatnonzero(ratio)
-    root = np.sqrt(mass[modal])
-    weight = root[:, :, None] * root[:, None, :]
-    squares, modes = np.linalg.eigh(stiffness[modal] / weight)
-    # A mechanism's square is zero up to rounding; it stays undamped.
-    squares[squares < 1e-12 * squares[:, -1:]] = 0.0
-    factor = modes * np.sqrt(np.sqrt(squares))[:, None, :]
-    damping[modal] += 2 * ratio[modal, None, None] * (factor @ factor.transpose(0, 2, 1)) * weight
-    return damping
-
-
 def ring(
     preset: str = "oberst2016",
     *,
@@ -249,7 +242,10 @@ def ring(
     certify: str = "auto",
     **nominal: ArrayLike,
 ) -> OscillatorRing:
-    """Return a ring of oscillators.
+    """Return a ring of oscillators: the planar model of hip squeak of Oberst et al. 2016.
+
+    Equations 2 to 7 and Table 1 of INTER-NOISE 2016, p. 5539. Each oscillator in contact is pressed into the
+    socket by a contact spring, and friction couples its two directions; springs join it to its neighbours.
 
     Parameters
     ----------
@@ -272,6 +268,7 @@ def ring(
     Returns
     -------
     OscillatorRing
+        A `CEAModel`: samples in, outcomes out.
 
     Raises
     ------
@@ -283,8 +280,12 @@ def ring(
     Examples
     --------
     >>> import hipuq
-    >>> hipuq.models.ring("oberst2016", damping_ratio=0.01).dofs
-    18
+    >>> model = hipuq.models.ring("oberst2016-calibrated", damping_ratio=0.001)
+    >>> model.dofs, model.parameters["contact_stiffness"].nominal[0].item()
+    (18, 4599000000.0)
+    >>> found = hipuq.unstable_friction(model, upper=0.1)
+    >>> found["start"].values.round(4)  # friction at the onset
+    array([0.0628])
     """
     check_name("preset of the ring", preset, PRESETS)
     n = check_count("oscillators", oscillators, 2)

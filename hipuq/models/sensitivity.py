@@ -50,10 +50,10 @@ def onset_sensitivity(
     -------
     Dataset
         One variable d mu / d p for each parameter p but friction and those that are yes or no, along
-        the dim of its elements, in 1 over the parameter's unit. Each parameter moves alone: the
-        friction angle of the ring too does not follow the contact angle here, so for one that does
-        add the two derivatives. NaN for damping parameters at flutter of a model without damping:
-        there the smallest damping moves the onset by a jump, not in proportion. Right to 4e-11 of
+        the dim of its elements, such as ``contact_stiffness(oscillator)``, in 1 over the parameter's unit.
+        Each parameter moves alone: the friction angle of the ring too does not follow the contact angle here,
+        so for one that does add the two derivatives. NaN for damping parameters at flutter of a model without
+        damping: there the smallest damping moves the onset by a jump, not in proportion. Right to 4e-11 of
         the largest of a parameter's elements for undamped rings, to 5e-9 with a damping ratio of 1e-4.
 
     Raises
@@ -68,7 +68,8 @@ def onset_sensitivity(
     --------
     >>> import hipuq
     >>> model = hipuq.models.two_dof("hulten")
-    >>> found = hipuq.onset_sensitivity(model, friction=7 / 24, frequency=7812.5**0.5)
+    >>> onset = {"friction": 7 / 24, "frequency": 7812.5**0.5}
+    >>> found = hipuq.onset_sensitivity(model, **onset)
     >>> float(found["frequency_1"].round(6))
     0.010417
     """
@@ -86,7 +87,7 @@ def onset_sensitivity(
     coords: dict[str, Any] = {}
     start = 0
     for name in names:
-        variable, shape = schema.PARAMETERS[name], values[name].shape
+        variable, shape = model.parameters[name].described(name), values[name].shape
         own = found[start : start + values[name].size].reshape(shape)
         start += values[name].size
         attrs = {"long_name": f"sensitivity of the onset to {variable.long_name}", "units": "1"}
@@ -95,7 +96,11 @@ def onset_sensitivity(
         if np.isnan(own).any():
             attrs["comment"] = "undamped flutter: the smallest damping moves the onset by a jump"
         data[name] = (variable.dims[1:], own, attrs)
-        coords |= {dim: schema.index(dim, size) for dim, size in zip(variable.dims[1:], shape, strict=True)}
+        coords |= {
+            dim: schema.index(dim, size)
+            for dim, size in zip(variable.dims[1:], shape, strict=True)
+            if dim in schema.COORDINATES
+        }
     coords["friction"] = ((), float(friction), {"long_name": "friction of the boundary", "units": "1"})
     coords["frequency"] = ((), float(frequency), {"long_name": "frequency of the boundary", "units": "Hz"})
     return schema.stamp(
@@ -116,9 +121,8 @@ def _derivatives(model: CEAModel, values: dict[str, Array], names: list[str]) ->
     row = 0
     for name in names:
         for element, value in np.ndenumerate(values[name]):
-            step = (
-                ANGLE_STEP if schema.PARAMETERS[name].units == "deg" else RELATIVE_STEP * (abs(value) or 1.0)
-            )
+            angle = model.parameters[name].described(name).units == "deg"
+            step = ANGLE_STEP if angle else RELATIVE_STEP * (abs(value) or 1.0)
             inside = value - 2 * step >= model.parameters[name].minimum
             offsets, factors = CENTRAL if inside else FORWARD
             batch[name][(slice(5 * row, 5 * row + 5), *element)] = value + step * offsets

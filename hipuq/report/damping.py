@@ -18,7 +18,7 @@ from hipuq.report.summary import distribution_text
 from hipuq.report.table import listed
 
 RATIOS = (DAMPING, "damping_1", "damping_2")
-"""Parameters that are damping ratios."""
+"""Parameters of damping that are pure numbers, told in per cent."""
 
 RAYLEIGH = ("mass_damping", "stiffness_damping")
 

@@ -7,12 +7,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator
 
-from hipuq.contact import ContactPatterns
+from hipuq.contact import CONTACT_PATTERNS, ContactPatterns
 from hipuq.distributions import DISTRIBUTIONS, from_table
 from hipuq.errors import HipuqError, StudyError, unknown_name
 from hipuq.variation import relative, shift
-
-CONTACT_PATTERNS = "contact_patterns"
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]*$"
 """What an analysis or a problem may be called: its group and its files are."""
