@@ -17,16 +17,19 @@ Array = NDArray[np.float64]
 def indices(a: Array, ab: Array, ba: Array, b: Array, pairs: Sequence[tuple[int, int]] = ()) -> Array:
     """Return Sobol indices as ``SALib.analyze.sobol`` estimates them.
 
-    First and total order after Saltelli et al., Comput. Phys. Commun. 181 (2010) 259, second order
-    after Saltelli, Comput. Phys. Commun. 145 (2002) 280.
+    First order after Saltelli et al., Comput. Phys. Commun. 181 (2010) 259, total order after Jansen,
+    Comput. Phys. Commun. 117 (1999) 35, second order after Saltelli, Comput. Phys. Commun. 145 (2002) 280.
 
     Parameters
     ----------
-    a, b : (blocks,) array
-        Outcomes of the two base matrices, centred and scaled.
-    ab, ba : (blocks, groups) array
-        Outcomes of A with one group of columns from B, and of B with one from A; `ba` is used for
-        pairs only.
+    a : (blocks,) array
+        Outcomes of the base matrix A, centred and scaled.
+    ab : (blocks, groups) array
+        Outcomes of A with one group of columns from B.
+    ba : (blocks, groups) array
+        Outcomes of B with one group of columns from A; used for pairs only.
+    b : (blocks,) array
+        Outcomes of the base matrix B.
     pairs : sequence of (int, int)
         Groups of which to return second-order indices, the smaller number first.
 

@@ -139,17 +139,19 @@ def at(results: xr.Dataset, **values: float) -> xr.Dataset:
     results : Dataset
         As from `sweep`.
     **values
-        Parameter = one of its values.
+        Parameter = one of its values, in the units of the schema.
 
     Returns
     -------
     Dataset
-        Ordinary results where no parameter is left; the values are scalar coords.
+        Results as from `run` where no parameter is left; the values are scalar coords.
 
     Raises
     ------
+    UnknownNameError
+        If the results are not over the parameter.
     InputError
-        If the results are not over the parameter, or have no such value.
+        If they have no such value.
     """
     names = swept(results)
     place: dict[str, int] = {}

@@ -49,7 +49,7 @@ class Design:
         Returns
         -------
         Dataset
-            Over ``sample``, of length ``stop - start``.
+            Over ``sample``, of length ``stop - start``, as from `hipuq.design`.
         """
         return self.make(slice(start, stop))
 
@@ -59,7 +59,8 @@ class Design:
         Parameters
         ----------
         points : sequence of mapping
-            Parameter that is not uncertain -> its value; an empty mapping changes nothing.
+            Parameter that is not uncertain -> its value, in the units of the schema; an empty mapping
+            changes nothing.
 
         Returns
         -------
@@ -87,11 +88,12 @@ class Design:
         Parameters
         ----------
         more : Dataset
-            Samples; what they lack of the bookkeeping of the first ones is missing (NaN).
+            Samples over ``sample``; what they lack of the bookkeeping of the first ones is missing (NaN).
 
         Returns
         -------
         Design
+            Of the samples of both.
         """
         example, count = self.rows(0, 1), more.sizes["sample"]
         own = [name for name in example.variables if name in more.variables]

@@ -21,6 +21,16 @@ from hipuq.sampling import Seed, seed_of
 def method_named(name: str) -> Method:
     """Return a method by name.
 
+    Parameters
+    ----------
+    name : str
+        Such as ``"monte_carlo"``.
+
+    Returns
+    -------
+    Method
+        Its record in `hipuq.methods.METHODS`.
+
     Raises
     ------
     UnknownNameError
@@ -37,7 +47,7 @@ def design(
     Parameters
     ----------
     method : str
-        Name of a method.
+        Name of a method: ``"monte_carlo"``, ``"chaos"`` or ``"sobol"``.
     inputs : Inputs
         The uncertain parameters.
     n : int
@@ -47,12 +57,32 @@ def design(
     rows : slice, optional
         Only these rows of the design; needs an integer seed to belong to the same design.
     **options
-        Options of the method's design.
+        Options of the method's design, such as those of `hipuq.methods.monte_carlo.design`.
 
     Returns
     -------
     Dataset
-        Over ``sample``, one variable for each uncertain parameter.
+        Over ``sample``, one variable for each uncertain parameter, in the units of the schema; coords over
+        ``sample`` are the method's bookkeeping.
+
+    Raises
+    ------
+    InputError
+        If `inputs` is something else, n does not suit the method, or an option cannot be used.
+    UnknownNameError
+        If there is no such method or option.
+
+    Examples
+    --------
+    >>> import chaospy as cp
+    >>> import hipuq
+    >>> model = hipuq.models.two_dof("hoffmann2002")
+    >>> inputs = model.inputs(friction=cp.Uniform(0.0, 1.0))
+    >>> samples = hipuq.design("monte_carlo", inputs, n=4, rng=1)
+    >>> samples["friction"].values.round(4)
+    array([0.3787, 0.4766, 0.5994, 0.2052])
+    >>> samples.attrs["seed"]
+    1
     """
     _check_inputs(inputs)
     record = method_named(method)
@@ -68,9 +98,9 @@ def estimate(
     Parameters
     ----------
     method : str
-        Name of a method.
+        Name of a method: ``"monte_carlo"``, ``"chaos"`` or ``"sobol"``.
     outcomes : Dataset
-        As from `evaluate`.
+        As from `evaluate`: the outcome over ``sample`` with the samples.
     inputs : Inputs
         The inputs of the design.
     of : str
@@ -78,11 +108,37 @@ def estimate(
     rng : int or Generator, optional
         Seed of what the method draws, if anything; by default it follows from the design's.
     **options
-        Options of the method's estimate.
+        Options of the method's estimate, such as those of `hipuq.methods.monte_carlo.estimate`.
 
     Returns
     -------
     Dataset
+        What the method tells of the outcome, each estimate with its limits ``_low`` and ``_high``: see the
+        ``estimate`` of the method. The attributes say from what it was made.
+
+    Raises
+    ------
+    InputError
+        If `inputs` is something else, `of` is not a name, or an option cannot be used.
+    UnknownNameError
+        If there is no such method, option or outcome.
+    SchemaError
+        If the outcomes do not follow the schema, or are of a design that the method cannot use.
+
+    Examples
+    --------
+    >>> import chaospy as cp
+    >>> import hipuq
+    >>> model = hipuq.models.two_dof("hoffmann2002")
+    >>> inputs = model.inputs(friction=cp.Uniform(0.0, 1.0))
+    >>> samples = hipuq.design("monte_carlo", inputs, n=10_000, rng=1)
+    >>> outcomes = hipuq.evaluate(model, samples)
+    >>> results = hipuq.estimate(
+    ...     "monte_carlo", outcomes, inputs, of="any_unstable"
+    ... )
+    >>> names = ["probability_low", "probability", "probability_high"]
+    >>> [round(results[name].item(), 3) for name in names]
+    [0.522, 0.532, 0.542]
     """
     _check_inputs(inputs)
     _check_of(of)
@@ -96,8 +152,14 @@ def lazy_design(method: str, inputs: Inputs, n: int, rng: Seed = None, **options
 
     Parameters
     ----------
-    method, inputs, n, rng
-        As in `design`.
+    method : str
+        Name of a method: ``"monte_carlo"``, ``"chaos"`` or ``"sobol"``.
+    inputs : Inputs
+        The uncertain parameters.
+    n : int
+        Size of the design; what it counts is the method's to say.
+    rng : int or Generator, optional
+        Seed; without it one from the operating system, which the attribute ``seed`` then names.
     **options
         Options of the method's design.
 
@@ -105,6 +167,13 @@ def lazy_design(method: str, inputs: Inputs, n: int, rng: Seed = None, **options
     -------
     Design
         For `evaluate` with a store: the same samples as of `design`, never in memory together.
+
+    Raises
+    ------
+    InputError
+        If `inputs` is something else, n does not suit the method, or an option cannot be used.
+    UnknownNameError
+        If there is no such method or option.
 
     Examples
     --------
@@ -145,19 +214,34 @@ def run(
     Parameters
     ----------
     model : callable
-        Samples Dataset -> outcomes Dataset.
+        Samples Dataset -> outcomes Dataset, as in `evaluate`.
     inputs : Inputs
         The uncertain parameters.
     method : str
-        Name of a method.
+        Name of a method: ``"monte_carlo"``, ``"chaos"`` or ``"sobol"``.
     n : int
-        Size of the design.
+        Size of the design; what it counts is the method's to say.
     of : str
         Name of the outcome to analyse; nothing else is evaluated.
     rng : int or Generator, optional
-        Seed.
-    n_jobs, executor, progress, store, resume, on_error, max_failed, retry_failed
-        As in `evaluate`. With a store samples are made by rows, and memory does not grow with them.
+        Seed; without it one from the operating system, which the attribute ``seed`` then names.
+    n_jobs : int, optional
+        Threads or processes; all cores by default.
+    executor : str, concurrent.futures.Executor or dask.distributed.Client, optional
+        ``"threads"`` (the default), ``"processes"``, or what runs the blocks instead, as in `evaluate`.
+    progress : bool, optional
+        Whether to show a progress bar; by default on a terminal.
+    store : path, optional
+        Zarr store to which outcomes are written as they come. Samples are then made by rows, and memory does
+        not grow with them.
+    resume : bool, default False
+        Whether to go on with what the store has.
+    on_error : str, default "mark"
+        ``"mark"`` or ``"raise"``: what becomes of a sample that fails, as in `evaluate`.
+    max_failed : float, default 0.5
+        Share of the samples that may fail before the run ends [1], as in `evaluate`.
+    retry_failed : bool, default False
+        Whether, when a store is gone on with, its samples that failed are evaluated again.
     **options
         Options of the method; each stage gets its own.
 
@@ -165,6 +249,34 @@ def run(
     -------
     Dataset
         Results, as from `estimate`.
+
+    Raises
+    ------
+    InputError
+        If an argument or an option cannot be used.
+    UnknownNameError
+        If there is no such method, option or outcome.
+    SchemaError
+        If samples or outputs do not follow the contract.
+    ModelError
+        If too many samples fail, or one with ``on_error="raise"``.
+    StoreError
+        If the store cannot be written, holds something else, or another run writes to it.
+
+    Examples
+    --------
+    With all else known this model is unstable above a friction of 0.4724, so the exact answer is 0.5276.
+
+    >>> import chaospy as cp
+    >>> import hipuq
+    >>> model = hipuq.models.two_dof("hoffmann2002")
+    >>> inputs = model.inputs(friction=cp.Uniform(0.0, 1.0))
+    >>> results = hipuq.run(
+    ...     model, inputs, method="monte_carlo", n=10_000, of="any_unstable", rng=1
+    ... )
+    >>> names = ["probability_low", "probability", "probability_high"]
+    >>> [round(results[name].item(), 3) for name in names]
+    [0.522, 0.532, 0.542]
     """
     record, stages = check_arguments(inputs, method, n, of, options)
     how = How(n_jobs, executor, progress, store, resume, on_error, max_failed, retry_failed)
@@ -179,12 +291,21 @@ def check_arguments(
 
     Parameters
     ----------
-    inputs, method, n, of, options
-        As in `run`.
+    inputs : object
+        Refused if not `Inputs`.
+    method : str
+        Name of a method.
+    n : int
+        Size of the design.
+    of : object
+        Refused if not the name of an outcome.
+    options : mapping
+        Options of the method, of all stages together.
 
     Returns
     -------
     method : Method
+        The record of the method.
     stages : dict
         Options by stage.
 

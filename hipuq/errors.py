@@ -1,4 +1,4 @@
-"""Errors of hipuq: each is a :class:`HipuqError` and the built-in that fits."""
+"""Errors of hipuq: each is a `HipuqError` and the built-in that fits."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -47,6 +47,7 @@ def check_name(kind: str, name: object, allowed: Iterable[str]) -> str:
     Returns
     -------
     str
+        The name.
 
     Raises
     ------

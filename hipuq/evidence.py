@@ -110,13 +110,22 @@ def literature(quantity: str) -> xr.Dataset:
     Returns
     -------
     Dataset
-        ``value``, ``low``, ``high`` over ``source``, NaN where the source does not give it; coord
-        ``reference(source)``.
+        ``value``, ``low``, ``high`` over ``source``, [1], or [Hz] of a frequency, NaN where the source does
+        not give it; coord ``reference(source)``.
 
     Raises
     ------
     UnknownNameError
         If there is nothing of the quantity.
+
+    Examples
+    --------
+    >>> import hipuq
+    >>> published = hipuq.literature("critical_friction")
+    >>> published["value"].to_series().to_dict()
+    {'long Ti stem': 0.29, 'long CoCr stem': 0.32, 'short Ti stem': 0.39}
+    >>> str(published["reference"].values[0])
+    'Fan et al., J. Orthop. Res. 31 (2013) 1627'
     """
     long_name, units, figures = FIGURES[check_name("published quantity", quantity, FIGURES)]
     data: dict[str, Any] = {

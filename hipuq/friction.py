@@ -56,6 +56,9 @@ def integrate_friction(model: CEAModel, distribution: object) -> FrictionIntegra
     Returns
     -------
     FrictionIntegrated
+        A model like any other: of samples without friction it gives ``probability``, ``onset`` and the other
+        outcomes of `hipuq.schema.INTEGRATED`. It is conditional Monte Carlo, or preintegration (Griewank,
+        Kuo, Leovey, Sloan, J. Comput. Appl. Math. 344 (2018) 259), once the rest is sampled.
 
     Raises
     ------
@@ -66,7 +69,8 @@ def integrate_friction(model: CEAModel, distribution: object) -> FrictionIntegra
     --------
     >>> import chaospy as cp
     >>> import hipuq
-    >>> exact = hipuq.integrate_friction(hipuq.models.ring("oberst2016"), cp.Uniform(0.0, 0.1))
+    >>> model = hipuq.models.ring("oberst2016")
+    >>> exact = hipuq.integrate_friction(model, cp.Uniform(0.0, 0.1))
     >>> outcomes = hipuq.evaluate(exact, exact.nominal())
     >>> outcomes["probability"].values.round(10)
     array([0.90502728])
@@ -96,9 +100,22 @@ class FrictionIntegrated:
     model : CEAModel
         The model with friction.
     distribution : Distribution
-        Of the friction coefficient.
+        Of the friction coefficient [1].
     outcomes : tuple of str
         Names of the outcomes that a call can give.
+    parameters : dict
+        Name -> `hipuq.models.Parameter`, those of the model but friction.
+    lower, upper : float
+        Range of friction that is swept [1].
+    block : int
+        Samples that it takes at a time, at most.
+    ragged : tuple of str
+        Dims whose length depends on the samples.
+
+    Raises
+    ------
+    InputError
+        If the distribution leaves nothing to integrate over.
     """
 
     outcomes = (*schema.INTEGRATED, "status", "decided_by")
@@ -124,17 +141,68 @@ class FrictionIntegrated:
         return {**self.model.options, "integrated": {FRICTION: dict(self.distribution.description)}}
 
     def inputs(self, **distributions: object) -> Inputs:
-        """Return inputs that know the model's nominal values, see `CEAModel.inputs`."""
+        """Return inputs that know the model's nominal values, see `CEAModel.inputs`.
+
+        Parameters
+        ----------
+        **distributions
+            Parameter name = a distribution, `relative`, `shift` or `ContactPatterns`; not friction.
+
+        Returns
+        -------
+        Inputs
+            To be given to `hipuq.design` or `hipuq.run`.
+
+        Raises
+        ------
+        InputError
+            If friction is among them, or a distribution cannot be used.
+        UnknownNameError
+            If the model has no such parameter.
+        """
         self._refuse(distributions)
         return self.model.inputs(**distributions)
 
     def nominal(self, **changes: ArrayLike) -> xr.Dataset:
-        """Return one sample at the nominal values with changes, see `CEAModel.nominal`."""
+        """Return one sample at the nominal values with changes, see `CEAModel.nominal`.
+
+        Parameters
+        ----------
+        **changes
+            Parameter name = value, in the units of the schema; not friction.
+
+        Returns
+        -------
+        Dataset
+            Over ``sample``, one variable for each parameter changed.
+
+        Raises
+        ------
+        InputError
+            If friction is among them, or a shape does not fit.
+        UnknownNameError
+            If the model has no such parameter.
+        """
         self._refuse(changes)
         return self.model.nominal(**changes)
 
     def check(self, samples: xr.Dataset) -> None:
-        """Check all samples at once, see `CEAModel.check`."""
+        """Check all samples at once, see `CEAModel.check`.
+
+        Parameters
+        ----------
+        samples : Dataset
+            Parameters over ``sample``, without friction.
+
+        Raises
+        ------
+        InputError
+            If friction is among them, or a value is not allowed.
+        UnknownNameError
+            If a variable is none of the model's parameters.
+        SchemaError
+            If a shape does not fit.
+        """
         self._refuse_samples(samples)
         self.model.check(samples)
 

@@ -35,16 +35,16 @@ def friction_limit(outcomes: xr.Dataset, target: ArrayLike, *, confidence: float
         ``probability`` with its limits over ``friction``, as from `hipuq.fragility` or a `sweep` over
         friction: then it is the highest friction of the curve up to which no probability exceeds the target.
     target : float or (t,) array
-        Probabilities that must not be exceeded, from 0 to below 1.
+        Probabilities that must not be exceeded [1], from 0 to below 1.
     confidence : float, default 0.95
-        Level of the interval: where the Wilson limits of the share cross the target. A curve has its own.
+        Level of the interval [1]: where the Wilson limits of the share cross the target. A curve has its own.
 
     Returns
     -------
     Dataset
-        ``friction_limit``, ``friction_limit_low``, ``friction_limit_high`` over ``target``. Infinity means
-        that the target is not exceeded up to the end of the range (attribute ``range``), minus infinity that
-        it is from the start, so that there is no such friction, and NaN that nothing is known. Undecided
+        ``friction_limit``, ``friction_limit_low``, ``friction_limit_high`` [1] over ``target``. Infinity
+        means that the target is not exceeded up to the end of the range (attribute ``range``), minus infinity
+        that it is from the start, so that there is no such friction, and NaN that nothing is known. Undecided
         configurations count as unstable throughout in the lower limit and as never unstable in the upper one.
 
     Raises
@@ -53,6 +53,20 @@ def friction_limit(outcomes: xr.Dataset, target: ArrayLike, *, confidence: float
         If the outcomes have no onset, nor a probability over friction.
     InputError
         If a target or the confidence cannot be one.
+
+    Examples
+    --------
+    >>> import chaospy as cp
+    >>> import hipuq
+    >>> model = hipuq.models.two_dof("hoffmann2002")
+    >>> exact = hipuq.integrate_friction(model, cp.Uniform(0.0, 1.0))
+    >>> inputs = exact.inputs(k3=hipuq.relative(cp.Uniform(-0.1, 0.1)))
+    >>> samples = hipuq.design("monte_carlo", inputs, n=200, rng=1)
+    >>> outcomes = hipuq.evaluate(exact, samples)
+    >>> limit = hipuq.friction_limit(outcomes, 0.05)
+    >>> names = ["friction_limit_low", "friction_limit", "friction_limit_high"]
+    >>> [round(limit[name].item(), 3) for name in names]
+    [0.387, 0.391, 0.393]
     """
     if not isinstance(outcomes, xr.Dataset):
         raise SchemaError(f"outcomes must be an xarray Dataset, not {type(outcomes).__name__}")

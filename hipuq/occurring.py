@@ -42,6 +42,21 @@ def frequency_ranges(outcomes: xr.Dataset) -> xr.Dataset:
     ------
     SchemaError
         If one of the two outcomes is missing.
+
+    Examples
+    --------
+    >>> import chaospy as cp
+    >>> import hipuq
+    >>> model = hipuq.models.two_dof("hoffmann2002")
+    >>> drawn = {"friction": cp.Uniform(0.0, 1.0), "k3": cp.Uniform(9.0, 13.0)}
+    >>> samples = hipuq.design("monte_carlo", model.inputs(**drawn), n=1000, rng=1)
+    >>> outcomes = hipuq.evaluate(model, samples)
+    >>> ranges = hipuq.frequency_ranges(outcomes)
+    >>> ranges["unstable_samples"].values  # of modes 1 and 2
+    array([  0, 521])
+    >>> names = ["frequency_low", "frequency_high"]
+    >>> [round(ranges[name].sel(mode=2).item(), 3) for name in names]  # Hz
+    [0.715, 0.749]
     """
     for name in ("frequency", "unstable"):
         if (

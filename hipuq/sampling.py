@@ -119,7 +119,8 @@ def unit_points(sampler: str, n: int, dimension: int, seed: int, key: tuple[int,
     Parameters
     ----------
     sampler : str
-        ``"random"``, ``"latin_hypercube"`` or ``"sobol"`` (Owen scrambled).
+        ``"random"``, ``"latin_hypercube"`` or ``"sobol"`` (scrambled: by linear matrices and a digital
+        shift, as SciPy does).
     n : int
         Number of points of the whole design; a power of 2 for ``"sobol"``.
     dimension : int

@@ -52,35 +52,45 @@ def sweep(
     Parameters
     ----------
     model : callable
-        Samples Dataset -> outcomes Dataset.
+        Samples Dataset -> outcomes Dataset, as in `evaluate`.
     inputs : Inputs
         The uncertain parameters.
     over : mapping
-        Parameter, a single number for each sample -> its values, ascending; of several parameters every
-        combination.
+        Parameter, a single number for each sample -> its values, ascending, in the units of the schema; of
+        several parameters every combination.
     method : str
-        Name of a method.
+        Name of a method: ``"monte_carlo"``, ``"chaos"`` or ``"sobol"``.
     n : int
         Size of the design at each value.
     of : str
         Name of the outcome to analyse.
     rng : int or Generator, optional
-        Seed.
-    n_jobs, executor, progress
-        As in `evaluate`.
+        Seed; without it one from the operating system, which the attribute ``seed`` then names.
+    n_jobs : int, optional
+        Threads or processes; all cores by default.
+    executor : str, concurrent.futures.Executor or dask.distributed.Client, optional
+        ``"threads"`` (the default), ``"processes"``, or what runs the blocks instead, as in `evaluate`.
+    progress : bool, optional
+        Whether to show a progress bar; by default on a terminal.
     **options
         Options of the method.
 
     Returns
     -------
     Dataset
-        Results as from `run`, each variable with one more dim, first, for each parameter in `over`. What has
+        Results as from `run`, each variable with one more dim, first, for each parameter in `over`, such as
+        ``probability(damping_ratio)``. What has
         other labels at each value, such as the terms of a sparse expansion, is left out.
 
     Raises
     ------
     InputError
-        If a parameter is uncertain too, has several elements, or its values are not finite or do not ascend.
+        If a parameter is uncertain too, has several elements, or its values are not finite or do not ascend;
+        or as in `run`.
+    UnknownNameError
+        If the model has no such parameter, or as in `run`.
+    SchemaError, ModelError
+        As in `run`.
 
     Examples
     --------
@@ -89,9 +99,12 @@ def sweep(
     >>> model = hipuq.models.ring("oberst2016-calibrated")
     >>> inputs = model.inputs(friction=cp.Uniform(0.0, 0.4))
     >>> over = {"damping_ratio": [0.0, 0.01]}
-    >>> results = hipuq.sweep(model, inputs, over, method="monte_carlo", n=1000, of="any_unstable", rng=1)
+    >>> how = {"method": "monte_carlo", "n": 1000, "of": "any_unstable"}
+    >>> results = hipuq.sweep(model, inputs, over, rng=1, **how)
     >>> results["probability"].dims
     ('damping_ratio',)
+    >>> results["probability"].values.round(3)
+    array([0.861, 0.699])
     """
     record, stages = check_arguments(inputs, method, n, of, options)
     values = check_over(over, model, inputs)

@@ -9,7 +9,7 @@ Sources
   matrices, with rigorously enclosed roots, and bisection in the friction coefficient.
 - Closed forms: Hoffmann, Fischer, Allgaier, Gaul, Mech. Res. Commun. 29 (2002) 197; Hulten, SAE
   932965 (1993), with Sinou and Jezequel, Eur. J. Mech. A 26 (2007) 106; Ziegler, Ing.-Arch. 20
-  (1952) 49, the pendulum under a follower load with unit masses, lengths and springs.
+  (1952) 49, the pendulum under a follower load with masses 2 and 1, unit lengths and springs.
 """
 
 import math

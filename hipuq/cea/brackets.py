@@ -156,10 +156,14 @@ def merging(x: Array, fewer: Complex, y: Array, more: Complex) -> tuple[int, int
 
     Parameters
     ----------
-    x, y : (n,) array
-        Real roots, ascending, then NaN; the second point has two fewer.
-    fewer, more : (p,) complex array
-        Pairs, then NaN; the second point has one more.
+    x : (n,) array
+        Real roots of the first point, ascending, then NaN.
+    fewer : (p,) complex array
+        Its pairs, then NaN.
+    y : (n,) array
+        Real roots of the second point, two fewer.
+    more : (p,) complex array
+        Its pairs, one more.
 
     Returns
     -------

@@ -14,7 +14,7 @@ from hipuq.errors import InputError
 
 @dataclass(frozen=True)
 class CompactPencils:
-    """Undamped pencils ``l**2 M + K0 + mu K1`` of s samples with n degrees of freedom.
+    """Undamped pencils ``l**2 M + K0 + mu K1`` of s samples with n degrees of freedom, by their entries.
 
     Attributes
     ----------
@@ -27,8 +27,7 @@ class CompactPencils:
     mechanisms : (s,) array of int
         As in `Pencils`.
     filter_radius : float
-        As in `Pencils`.
-
+        As in `Pencils` [1].
     trusted : bool
         Whether the numbers were checked before; shapes always are.
 
@@ -79,7 +78,18 @@ class CompactPencils:
 
     @classmethod
     def of(cls, pencils: Pencils) -> CompactPencils:
-        """Return the same matrices without their damping, without a copy of diagonal masses and stiffness."""
+        """Return the same matrices without their damping, without a copy of diagonal masses and stiffness.
+
+        Parameters
+        ----------
+        pencils : Pencils
+            Of s samples; a mass matrix that is not diagonal is reduced to unit mass.
+
+        Returns
+        -------
+        CompactPencils
+            Of the same samples.
+        """
         rest = pencils.friction, pencils.mechanisms, pencils.filter_radius, True
         if pencils.mass.ndim == 2:
             stiffness, friction_stiffness = Entries.whole(pencils.stiffness), pencils.friction_stiffness
@@ -89,6 +99,16 @@ class CompactPencils:
 
     def rows(self, samples: NDArray[np.intp] | slice = slice(None)) -> Pencils:
         """Return the matrices of some samples, all by default.
+
+        Parameters
+        ----------
+        samples : (k,) array of int or slice
+            Which samples.
+
+        Returns
+        -------
+        Pencils
+            Of these samples, in the same order.
 
         Raises
         ------

@@ -21,7 +21,7 @@ class Entries:
     Attributes
     ----------
     values : (m, s) or (m, 1) array
-        Numbers, the sample last; one column holds for all samples.
+        Numbers, in the unit of the matrix, the sample last; one column holds for all samples.
     source, row, column : (p,) array of int32
         Place p holds ``values[source[p]]`` at (row[p], column[p]).
 
@@ -66,6 +66,12 @@ class Entries:
         Parameters
         ----------
         matrices : (s, n, n) array
+            Of s samples, in the unit of the matrix.
+
+        Returns
+        -------
+        Entries
+            Of n * n places; its values are a view of the matrices.
         """
         s, n = matrices.shape[:2]
         row, column = np.indices((n, n), np.int32).reshape(2, -1)
@@ -79,13 +85,31 @@ class Entries:
         Parameters
         ----------
         values : (m, s) or (m, 1) array
+            Numbers, in the unit of the matrix.
         places : sequence of three int
+            Value, row and column of each place.
+
+        Returns
+        -------
+        Entries
+            Sums where places meet.
         """
         source, row, column = np.array(places, np.int32).reshape(-1, 3).T.copy()
         return cls(values, source, row, column)
 
     def of(self, samples: NDArray[np.intp] | slice) -> Entries:
-        """Return the entries of some samples."""
+        """Return the entries of some samples.
+
+        Parameters
+        ----------
+        samples : (k,) array of int or slice
+            Which samples.
+
+        Returns
+        -------
+        Entries
+            At the same places; values that hold for all samples stay as they are.
+        """
         values = self.values if self.values.shape[1] == 1 else self.values[:, samples]
         return Entries(values, self.source, self.row, self.column)
 

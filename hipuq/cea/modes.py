@@ -19,10 +19,10 @@ class ModeShapes:
     Attributes
     ----------
     eigenvalue : (n,) complex array
-        l [1/s], with Im l >= 0.
-    shape : (n mode, n degree of freedom) complex array
-        y [m], normalised to a modal mass ``y^H M y`` of 1 kg m^2, turned in phase so that the
-        largest entry is real and positive.
+        Eigenvalue l [1/s], with Im l >= 0.
+    shape : (n, n) complex array
+        Shape y of each mode along the degrees of freedom [m], normalised to a modal mass ``y^H M y`` of 1 kg
+        m^2, turned in phase so that the largest entry is real and positive.
     strain_energy : (n,) array
         Mean over a cycle of the energy in the frictionless springs, ``y^H K0 y / 4`` [J].
     kinetic_energy : (n,) array
@@ -56,6 +56,7 @@ def mode_shapes(pencils: Pencils) -> ModeShapes:
     Returns
     -------
     ModeShapes
+        Of n modes by ascending frequency.
 
     Raises
     ------

@@ -25,7 +25,7 @@ class Spectra:
     growth_rate : (s, n) array
         Re l [1/s].
     unstable : (s, n) array of float32
-        1 if the growth rate is above the threshold, 0 if not, NaN if that is not known.
+        Verdict [1]: 1 if the growth rate is above the threshold, 0 if not, NaN if that is not known.
     margin : (s,) array
         Stability margin [1], negative exactly where unstable, NaN where that is unknown. Undamped
         and without a threshold it is the smallest of: the squared gap of neighbouring real
@@ -47,7 +47,20 @@ class Spectra:
 
     @classmethod
     def empty(cls, samples: int, modes: int) -> Self:
-        """Return arrays of these sizes to be filled."""
+        """Return arrays of these sizes to be filled.
+
+        Parameters
+        ----------
+        samples : int
+            Number of samples s.
+        modes : int
+            Number of modes n.
+
+        Returns
+        -------
+        Spectra
+            Its numbers are whatever the memory held.
+        """
         shape = (samples, modes)
         return cls(
             np.empty(shape),
@@ -59,19 +72,27 @@ class Spectra:
         )
 
     def put(self, rows: NDArray[np.intp], part: Spectra) -> None:
-        """Set some samples to those of another batch."""
+        """Set some samples to those of another batch.
+
+        Parameters
+        ----------
+        rows : (k,) array of int
+            Places of the samples.
+        part : Spectra
+            Of k samples with as many modes.
+        """
         for field in fields(self):
             getattr(self, field.name)[rows] = getattr(part, field.name)
 
     @property
     def any_unstable(self) -> NDArray[np.float32]:
-        """1 if a mode is known to be unstable, 0 if all are known to be stable, else NaN; (s,)."""
+        """1 if a mode is known to be unstable, 0 if all are known to be stable, else NaN; (s,) [1]."""
         # The sample last: reductions over a few modes at a time are slow. A maximum is NaN if any is.
         modes = np.ascontiguousarray(self.unstable.T)
         return np.where(np.fmax.reduce(modes) == 1, np.float32(1), np.maximum.reduce(modes))
 
     @property
     def unstable_count(self) -> NDArray[np.float32]:
-        """Number of unstable modes, NaN if any mode is unknown; (s,)."""
+        """Number of unstable modes, NaN if any mode is unknown; (s,) [1]."""
         count: NDArray[np.float32] = self.unstable.sum(axis=1, dtype=np.float32)
         return count

@@ -28,7 +28,8 @@ def solve(
 ) -> Spectra:
     """Solve a batch of eigenvalue problems and judge their stability.
 
-    Each sample is solved by itself, so results do not depend on the batch that it is in.
+    The problem is ``(l**2 M + l C + K0 + mu K1) y = 0`` (Oberst et al., INTER-NOISE 2016, eq. 1). Each sample
+    is solved by itself, so results do not depend on the batch that it is in.
 
     Parameters
     ----------
@@ -44,12 +45,35 @@ def solve(
     Returns
     -------
     Spectra
+        Frequencies [Hz], growth rates [1/s], verdicts and margins [1] of the s samples.
 
     Raises
     ------
     InputError
-        If the threshold is negative or not finite, there is no such way to certify, or a mass
-        matrix is not positive definite.
+        If the threshold is negative or not finite, or a mass matrix is not positive definite.
+    UnknownNameError
+        If there is no such way to certify.
+
+    Examples
+    --------
+    Two modes of the squared circular frequencies 1 and 2, coupled by friction, flutter above mu = 0.5:
+
+    >>> import numpy as np
+    >>> from hipuq import cea
+    >>> pencils = cea.Pencils(
+    ...     mass=np.ones((2, 2)),
+    ...     stiffness=np.array(2 * [[[1.0, 0.0], [0.0, 2.0]]]),
+    ...     friction_stiffness=np.array(2 * [[[0.0, 1.0], [-1.0, 0.0]]]),
+    ...     friction=np.array([0.4, 0.6]),
+    ...     damping=None,
+    ...     mechanisms=np.array([0, 0]),
+    ... )
+    >>> spectra = cea.solve(pencils)
+    >>> spectra.growth_rate.round(4)
+    array([[ 0.    ,  0.    ],
+           [-0.1346,  0.1346]])
+    >>> spectra.any_unstable
+    array([0., 1.], dtype=float32)
     """
     if not (np.isfinite(growth_threshold) and growth_threshold >= 0):
         raise InputError(
@@ -124,15 +148,15 @@ def damping_ratio(frequency: Array, growth_rate: Array) -> Array:
 
     Parameters
     ----------
-    frequency : array
-        [Hz]
-    growth_rate : array of the same shape
-        [1/s]
+    frequency : (...,) array
+        Im l / (2 pi) [Hz].
+    growth_rate : (...,) array
+        Re l [1/s], of the same shape.
 
     Returns
     -------
-    array of the same shape
-        Negative for a growing mode.
+    (...,) array
+        Damping ratio [1] of the same shape, negative for a growing mode.
     """
     modulus = np.hypot(2 * np.pi * frequency, growth_rate)
     return np.divide(-growth_rate, modulus, out=np.full_like(modulus, np.nan), where=modulus > 0)

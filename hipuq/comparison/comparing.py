@@ -100,7 +100,9 @@ def compare(
     Parameters
     ----------
     model : callable
+        Samples Dataset -> outcomes Dataset, as in `evaluate`.
     inputs : Inputs
+        The uncertain parameters.
     contenders : mapping
         Name -> ``{"method": ..., "options": {...}}``, the options being those of the method. ``"model"``,
         ``"inputs"``, ``"of"`` and ``"quantity"`` beside them replace those of the comparison, as for friction
@@ -108,8 +110,10 @@ def compare(
     of : str
         The outcome analysed.
     reference : float, array, mapping, DataArray or Reference
-        The exact answer, or a reference far better than any contender; for indices one for each
-        parameter, by name or in the order of the first contender's inputs.
+        The exact answer, or a reference far better than any contender, in the unit of the outcome, of
+        probabilities and indices [1]: a number; for indices one for each parameter, by name or as an array
+        (parameters,) in the order of the first contender's inputs. A DataArray is matched by its coords, such
+        as ``pattern``; `hipuq.comparison.Reference` has limits too.
     budgets : sequence of int
         Numbers of evaluations; each contender takes as many as it can within them.
     replicates : int, default 30
@@ -121,7 +125,7 @@ def compare(
     rng : int or Generator, optional
         Seed from which all runs get theirs. A contender's depend on its name and the budget alone.
     confidence : float, default 0.95
-        Level of the limits of error and coverage told here; that of a contender's own intervals is its
+        Level of the limits of error and coverage told here [1]; that of a contender's own intervals is its
         option.
     n_jobs : int, optional
         Threads; all cores by default.
@@ -139,16 +143,25 @@ def compare(
     Returns
     -------
     Dataset
-        Over ``method``, ``budget`` and ``replicate``: ``estimate``, ``low``, ``high``; ``seconds`` of a run
-        and ``model_seconds`` of the model in it, imports and compilation apart.
-        Over ``method`` and ``budget``: ``evaluations``, ``replicates``; ``bias``, ``rmse`` and ``coverage``,
-        the share of intervals that hold the reference, with limits; ``rmse_ratio`` to the lowest error of the
-        budget, with limits; ``run_time`` and ``model_time``, medians of the seconds;
-        ``baseline_evaluations`` with limits, with which the baseline has the same error if its error falls as
-        n**-1/2; ``intervals``, the runs that gave one; ``cost_ratio`` with limits, time over that of the
-        baseline for the same error; ``break_even``, the time of one evaluation above which a contender on the
-        baseline's model costs less than the baseline.
+        Over ``method``, ``budget`` and ``replicate``:
+
+        - ``estimate``, ``low``, ``high``: what the run told;
+        - ``seconds`` of the run and ``model_seconds`` of the model in it, imports and compilation apart [s].
+
+        Over ``method`` and ``budget``:
+
+        - ``evaluations``, ``replicates``, and ``intervals``, the runs that gave one;
+        - ``bias``, ``rmse`` and ``coverage``, the share of intervals that hold the reference, with limits;
+        - ``rmse_ratio`` to the lowest error of the budget, with limits;
+        - ``run_time`` and ``model_time``, medians of the seconds [s];
+        - ``baseline_evaluations`` with limits, with which the baseline has the same error if its error falls
+          as ``n**-0.5``;
+        - ``cost_ratio`` with limits, time over that of the baseline for the same error;
+        - ``break_even``, the time of one evaluation above which a contender on the baseline's model costs
+          less than the baseline [s].
+
         Over ``method``: ``rate``, the slope of log error over log evaluations, with limits.
+
         Indices have also the dim ``parameter``, results by level that of the levels; ``rmse_overall`` and
         ``coverage_overall`` are over it too. NaN where a contender does not take part.
 
@@ -158,6 +171,22 @@ def compare(
         If a contender, a budget or the reference cannot be used, or results lack the quantity.
     StoreError
         If the file cannot be used, or holds runs of something else.
+
+    Examples
+    --------
+    >>> import chaospy as cp
+    >>> import hipuq
+    >>> def double(samples):
+    ...     return samples[["x"]].rename(x="y") * 2.0
+    >>> contenders = {
+    ...     "random": {"method": "monte_carlo"},
+    ...     "sobol": {"method": "monte_carlo", "options": {"sampler": "sobol"}},
+    ... }
+    >>> inputs = hipuq.Inputs(x=cp.Uniform(0.0, 1.0))
+    >>> how = {"of": "y", "reference": 1.0, "budgets": [64], "replicates": 5}
+    >>> found = hipuq.compare(double, inputs, contenders, rng=1, **how)
+    >>> found["rmse"].sel(budget=64).to_series().round(4).to_dict()
+    {'random': 0.0742, 'sobol': 0.0071}
     """
     plan = race(
         model,

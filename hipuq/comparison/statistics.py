@@ -187,9 +187,14 @@ def rates(rmse: Array, resampled: Array, evaluations: NDArray[np.int64], level: 
 
     Parameters
     ----------
-    rmse, evaluations : (m, b) array
+    rmse : (m, b) array
+        Root mean square errors.
     resampled : (RESAMPLES, m, b) array
+        As from `errors`.
+    evaluations : (m, b) array of int
+        Model runs of one run.
     level : float
+        Of the limits.
 
     Returns
     -------

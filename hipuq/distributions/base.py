@@ -27,11 +27,11 @@ class Distribution:
     source : object
         The object that it was made from.
     ppf : callable
-        Quantile function: array in (0, 1) -> array of the same shape.
+        Quantile function: probabilities [1], an array in (0, 1) -> array of the same shape.
     cdf : callable or None
-        Cumulative probability: array -> array of the same shape.
+        Cumulative probability: array -> probabilities [1], an array of the same shape.
     support : tuple of float
-        Its lower and upper end.
+        Its lower and upper end, in the unit of the variable.
     description : mapping
         What rebuilds it, JSON-able; ``{"kind": "opaque", ...}`` where nothing can, or somewhere in it.
     """

@@ -128,11 +128,16 @@ def lubrication(
     InputError
         If a part cannot be used: not a distribution, without ``cdf``, below 0, probabilities that do not add
         up to 1, or limits that are not 0 < boundary_below < film_from.
+    UnknownNameError
+        If a probability or a source is given for a part that does not exist.
 
     Examples
     --------
     >>> import hipuq
-    >>> hipuq.lubrication({"film": 0.5, "mixed": 0.3, "boundary": 0.2}).cdf([0.08, 0.25, 0.65, 1.0])
+    >>> hipuq.lubrication().ppf([0.05, 0.5, 0.95]).round(3)
+    array([0.052, 0.151, 0.871])
+    >>> friction = hipuq.lubrication({"film": 0.5, "mixed": 0.3, "boundary": 0.2})
+    >>> friction.cdf([0.08, 0.25, 0.65, 1.0])
     array([0.5, 0.8, 0.9, 1. ])
     """
     limits = {"boundary_below": boundary_below, "film_from": film_from}

@@ -69,7 +69,7 @@ def mixture(
         The distributions, of chaospy, frozen ones of scipy, mixtures, or objects with ``ppf`` and ``cdf``;
         in a mapping by name.
     weights : sequence or mapping, optional
-        Their probabilities, in the same order or by the same names; all alike without it. A component of
+        Their probabilities [1], in the same order or by the same names; all alike without it. A component of
         weight 0 stays in the description and is never drawn.
 
     Returns
@@ -82,12 +82,15 @@ def mixture(
     InputError
         If there is no component, one has no ``cdf``, or the weights are not as many as the components,
         finite, not negative, and 1 together.
+    UnknownNameError
+        If a weight is given by a name that no component has.
 
     Examples
     --------
     >>> import chaospy as cp
     >>> import hipuq
-    >>> two = hipuq.mixture([cp.Uniform(0.0, 1.0), cp.Uniform(3.0, 5.0)], [0.25, 0.75])
+    >>> parts = [cp.Uniform(0.0, 1.0), cp.Uniform(3.0, 5.0)]
+    >>> two = hipuq.mixture(parts, weights=[0.25, 0.75])
     >>> two.ppf([0.125, 0.25, 0.5, 1.0]).round(3)
     array([0.5  , 1.   , 3.667, 5.   ])
     >>> two.cdf([0.5, 2.0, 4.0])

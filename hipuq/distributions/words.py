@@ -51,7 +51,8 @@ def described(description: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> described({"kind": "chaospy", "name": "Normal", "kwargs": {"mu": 0.0, "sigma": 2.0}})
+    >>> arguments = {"mu": 0.0, "sigma": 2.0}
+    >>> described({"kind": "chaospy", "name": "Normal", "kwargs": arguments})
     'Normal(mu=0.0, sigma=2.0)'
     """
     if "components" in description:

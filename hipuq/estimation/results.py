@@ -72,7 +72,8 @@ def check_independent(outcomes: xr.Dataset, *, strata: bool = False) -> None:
     """
     if "matrix" in outcomes.coords:
         raise SchemaError(
-            "the outcomes are of a Sobol design, whose samples share values: take those of one matrix, "
+            "the outcomes are of a design of several matrices, as for Sobol indices, whose samples share "
+            "values: take those of one matrix, "
             "outcomes.isel(sample=outcomes.matrix == 0).drop_vars(['block', 'matrix'])"
         )
     if strata or "stratum" not in outcomes.coords:

@@ -58,8 +58,8 @@ def evaluate(
         ``check``, that sees all samples first, or the first of a Design. An attribute ``block`` says how many
         samples it takes at a time, by default 1024; ``ragged`` names dims that may differ between blocks.
     samples : Dataset or Design
-        Over ``sample``; see `hipuq.schema.check_samples`. A Design, from `hipuq.lazy_design`, makes its
-        samples when they are needed.
+        Over ``sample``, in the units of the schema; see `hipuq.schema.check_samples`. A Design, from
+        `hipuq.lazy_design`, makes its samples when they are needed.
     keep : iterable of str, optional
         Outcomes wanted; nothing else is computed (where the model knows how) or stored.
     n_jobs : int, optional
@@ -80,7 +80,7 @@ def evaluate(
         outputs and a line in the table ``failure_message``; ``"raise"`` ends the run at the first one. Where
         a model gives no status of its own, a verdict that is NaN is undecided, any other NaN a failure.
     max_failed : float, default 0.5
-        Share of the samples that may fail with an error or a wrong shape before the run ends; NaN is an
+        Share of the samples that may fail with an error or a wrong shape before the run ends [1]; NaN is an
         answer, and as much of it as there is stays.
     retry_failed : bool, default False
         Whether, when a store is gone on with, its samples that failed are evaluated again.
@@ -88,18 +88,42 @@ def evaluate(
     Returns
     -------
     Dataset
-        The samples, what the model gave, and ``status``; outputs are floating point numbers. Results do not
+        The samples, what the model gave, and ``status``, over ``sample``; outputs are floating point numbers,
+        in the units of the schema if the model is one of hipuq. Results do not
         depend on `n_jobs`, `executor` or `store`; the attribute ``seconds`` and the time in ``history`` do.
         Values of a store are read when they are used.
 
     Raises
     ------
+    InputError
+        If an argument cannot be used, or a value in the samples is not allowed.
+    UnknownNameError
+        If the model has no such parameter or outcome.
     SchemaError
         If samples or outputs do not follow the contract.
     ModelError
         If too many samples fail, or one with ``on_error="raise"``; its message tells inputs and reason.
     StoreError
         If the store cannot be written, holds something else, or another run writes to it.
+
+    Examples
+    --------
+    >>> import hipuq
+    >>> model = hipuq.models.two_dof("hoffmann2002")
+    >>> outcomes = hipuq.evaluate(model, model.nominal(friction=[0.4, 0.5]))
+    >>> outcomes["any_unstable"].values
+    array([0., 1.], dtype=float32)
+    >>> outcomes["growth_rate"].values[1].round(4)
+    array([-0.1187,  0.1187])
+
+    Any function from samples to outputs is a model:
+
+    >>> import xarray as xr
+    >>> def root(samples):
+    ...     return samples[["x"]].rename(x="root") ** 0.5
+    >>> samples = xr.Dataset({"x": ("sample", [1.0, 4.0])})
+    >>> hipuq.evaluate(root, samples)["root"].values
+    array([1., 2.])
     """
     how = How(n_jobs, executor, progress, store, resume, on_error, max_failed, retry_failed)
     return evaluated(model, samples, keep, how)

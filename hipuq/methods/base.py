@@ -47,7 +47,18 @@ class Method:
     validate: Callable[..., None] | None = None
 
     def options(self, stage: str) -> dict[str, Any]:
-        """Return the options of a stage, one of `STAGES`, with their defaults."""
+        """Return the options of a stage with their defaults.
+
+        Parameters
+        ----------
+        stage : str
+            One of `STAGES`.
+
+        Returns
+        -------
+        dict
+            Name of an option -> its default; empty if the method has no such stage.
+        """
         function = getattr(self, stage)
         if function is None:
             return {}
@@ -59,7 +70,14 @@ class Method:
         }
 
     def check(self, stage: str, options: Mapping[str, Any]) -> None:
-        """Check that all options belong to ``"design"`` or ``"estimate"``.
+        """Check that all options belong to a stage.
+
+        Parameters
+        ----------
+        stage : str
+            One of `STAGES`, such as ``"design"``.
+        options : mapping
+            Options by name.
 
         Raises
         ------
@@ -75,12 +93,18 @@ class Method:
         Parameters
         ----------
         inputs : Inputs
+            The uncertain parameters.
         n : int
             Size of the design.
         of : sequence of str
             Outcomes to analyse.
         stages : mapping
             Options by stage, as from `split`.
+
+        Returns
+        -------
+        int
+            As of `evaluations`.
 
         Raises
         ------
@@ -94,6 +118,16 @@ class Method:
 
     def split(self, options: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         """Return the options of each stage; several may take the same one.
+
+        Parameters
+        ----------
+        options : mapping
+            Options of all stages together, by name.
+
+        Returns
+        -------
+        dict
+            Stage of `STAGES` -> its options.
 
         Raises
         ------

@@ -70,13 +70,13 @@ def design(
         ``"sobol"`` (any number of them: a fit asks for no balance), ``"latin_hypercube"``, ``"random"`` or
         ``"quadrature"``.
     held_out : float, default 0.2
-        Samples to check, as a share of those to fit; they are drawn from all inputs at random.
+        Samples to check, as a share of those to fit [1]; they are drawn from all inputs at random.
 
     Returns
     -------
     Dataset
-        Coords ``round``, 0, ``stratum`` (-1 to fit, 0 held out), ``stratum_weight`` and, with
-        ``"quadrature"``, ``quadrature_weight`` over sample.
+        The inputs over ``sample``. Coords ``round``, 0, ``stratum`` (-1 to fit, 0 held out),
+        ``stratum_weight`` and, with ``"quadrature"``, ``quadrature_weight`` over sample.
 
     Raises
     ------
@@ -109,13 +109,20 @@ def evaluations(
     Parameters
     ----------
     inputs : Inputs
+        The uncertain parameters.
     n : int
-    sampler, held_out, correction
-        As in `design` and `refine`.
+        As in `design`.
+    sampler : str
+        As in `design`.
+    held_out : float, default 0.2
+        As in `design` [1].
+    correction : int, default 0
+        As in `refine`.
 
     Returns
     -------
     int
+        Samples to fit, held-out ones and those of the correction.
     """
     share, levels, held = plan(inputs, n, sampler, held_out)
     return share * levels + held + check_count("correction", correction, 0)
@@ -141,12 +148,29 @@ def validate(
     Parameters
     ----------
     inputs : Inputs
+        The uncertain parameters.
     n : int
         As in `design`.
     of : sequence of str
         Outcomes to analyse.
-    sampler, correction, fit, degree, q, interaction, limit, population, groups
-        As in `design`, `refine` and `estimate`.
+    sampler : str
+        As in `design`.
+    correction : int, default 0
+        As in `refine`.
+    fit : str, optional
+        As in `estimate`.
+    degree : int, optional
+        As in `estimate`.
+    q : float, default 1
+        As in `estimate` [1].
+    interaction : int, optional
+        As in `estimate`.
+    limit : float, optional
+        As in `estimate`, in the unit of the outcome.
+    population : int, default 2**16
+        As in `estimate`.
+    groups : bool, default True
+        As in `estimate`.
 
     Raises
     ------
@@ -185,6 +209,7 @@ def refine(
     outcomes : Dataset
         Outcomes of the rounds so far.
     inputs : Inputs
+        The inputs of the design.
     rng : Generator
         Draws the samples.
     of : str
@@ -192,18 +217,32 @@ def refine(
     correction : int, default 0
         Number of samples: random ones in strata of equal predictions, more of them where events and
         none are mixed, that is near the limit state.
-    fit, degree, q, interaction, limit, population
+    fit : str, optional
+        As in `estimate`.
+    degree : int, optional
+        As in `estimate`.
+    q : float, default 1
+        As in `estimate` [1].
+    interaction : int, optional
+        As in `estimate`.
+    limit : float, optional
+        As in `estimate`, in the unit of the outcome.
+    population : int, default 2**16
         As in `estimate`.
 
     Returns
     -------
     Dataset or None
-        None if no correction is asked for, or it has been made.
+        Samples as from `design`, with ``round`` 1; None if no correction is asked for, or it has been made.
 
     Raises
     ------
     InputError
         If the outcome has no limit state, or `correction` is too small.
+    SchemaError
+        If the outcomes are not of a design of this method.
+    UnknownNameError
+        If there is no such outcome.
     """
     wanted = check_correction(correction, population)
     if not wanted:
@@ -242,6 +281,9 @@ def estimate(
 ) -> xr.Dataset:
     """Fit the expansion and tell mean, variance, quantiles, Sobol indices, and how far to trust them.
 
+    Mean, variance and indices are sums of squared coefficients (Sudret, Reliab. Eng. Syst. Saf. 93 (2008)
+    964).
+
     Parameters
     ----------
     outcomes : Dataset
@@ -258,20 +300,21 @@ def estimate(
     degree : int, optional
         Degree of the expansion; by default the one with the smallest corrected leave-one-out error.
     q : float, default 1
-        Norm of the truncation: below 1 terms of several inputs are fewer (hyperbolic).
+        Norm of the truncation [1]: below 1 terms of several inputs are fewer (hyperbolic).
     interaction : int, optional
         Most inputs that a term may have.
     limit : float, optional
-        The event is that the outcome lies below it; by default what the outcome says of itself.
-    held_out : float
-        Share of the samples, relative to those to fit, that is held out at random where the samples do
+        The event is that the outcome lies below it, in the unit of the outcome; by default what the outcome
+        says of itself.
+    held_out : float, default 0.2
+        Share of the samples [1], relative to those to fit, that is held out at random where the samples do
         not say themselves which.
-    population : int
+    population : int, default 2**16
         Points at which the surrogate is evaluated for quantiles and probabilities, a power of 2.
     groups : bool, default True
         Whether indices are those of parameters; False gives those of their elements.
     confidence : float, default 0.95
-        Level of the intervals.
+        Level of the intervals [1].
 
     Returns
     -------
@@ -286,6 +329,10 @@ def estimate(
     ------
     InputError
         If the outcome has infinite values, there are too few samples, or an option is not allowed.
+    SchemaError
+        If the outcome does not hold numbers over ``sample``, or the samples are of a Sobol design.
+    UnknownNameError
+        If there is no such outcome.
     """
     confidence = check_confidence(confidence)
     check_population(population)

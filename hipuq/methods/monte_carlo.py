@@ -57,7 +57,7 @@ def design(
     stratify: str | bool = False,
     replicates: int | None = None,
 ) -> xr.Dataset:
-    """Return samples of the inputs.
+    """Return samples of the inputs: random, a latin hypercube, or scrambled Sobol points.
 
     Parameters
     ----------
@@ -79,13 +79,16 @@ def design(
     Returns
     -------
     Dataset
-        Coords ``replicate(sample)``, if there are several, and in a stratified design the level's
-        number and ``weight(sample)``, its probability.
+        The inputs over ``sample``. Coords ``replicate(sample)``, if there are several, and in a stratified
+        design the level's number and ``weight(sample)``, its probability.
 
     Raises
     ------
     InputError
-        If n does not suit the sampler or the replicates.
+        If n does not suit the sampler or the replicates, or `stratify` is True and there is not exactly one
+        discrete input.
+    UnknownNameError
+        If there is no such sampler or discrete input.
     """
     share, parts, levels = _plan(inputs, n, sampler, stratify, replicates)
     seed = seed_of(rng)
@@ -144,13 +147,27 @@ def evaluations(
     Parameters
     ----------
     inputs : Inputs
+        The uncertain parameters.
     n : int
-    sampler, stratify, replicates
+        As in `design`.
+    sampler : str
+        As in `design`.
+    stratify : str or bool
+        As in `design`.
+    replicates : int, optional
         As in `design`.
 
     Returns
     -------
     int
+        n, times the number of levels in a stratified design.
+
+    Raises
+    ------
+    InputError
+        As `design`.
+    UnknownNameError
+        As `design`.
     """
     share, parts, levels = _plan(inputs, n, sampler, stratify, replicates)
     strata = 1 if levels is None else levels.sizes[levels.attrs["dim"]]
@@ -208,7 +225,7 @@ def estimate(
     rng : int or Generator, optional
         Not used: nothing here is random.
     confidence : float, default 0.95
-        Level of the intervals.
+        Level of the intervals [1].
 
     Returns
     -------
@@ -224,7 +241,10 @@ def estimate(
     InputError
         If the outcome has infinite values or the confidence is not one.
     SchemaError
-        If the samples are of another method's design and no plain draws of the inputs.
+        If the samples are of another method's design and no plain draws of the inputs, or the outcome does
+        not hold numbers over ``sample``.
+    UnknownNameError
+        If there is no such outcome.
     """
     confidence = check_confidence(confidence)
     values = schema.check_outcomes(outcomes, of)

@@ -51,7 +51,11 @@ def design(
     groups: bool = True,
     second_order: bool = False,
 ) -> xr.Dataset:
-    """Return samples of the inputs; `hipuq.saltelli.layout` says which rows.
+    """Return the samples that Sobol indices are estimated from.
+
+    They are the rows of Saltelli, Comput. Phys. Commun. 145 (2002) 280: of each base point one of a matrix A,
+    one of a matrix B, and for each parameter that of A with the columns of the parameter taken from B; for
+    pairs also that of B with the columns from A.
 
     Parameters
     ----------
@@ -73,7 +77,8 @@ def design(
     Returns
     -------
     Dataset
-        Coords ``block(sample)``, the base point from 0, and ``matrix(sample)``, a flag.
+        The inputs over ``sample``. Coords ``block(sample)``, the base point from 0, and ``matrix(sample)``, a
+        flag.
 
     Raises
     ------
@@ -115,13 +120,18 @@ def evaluations(inputs: Inputs, n: int, *, groups: bool = True, second_order: bo
     Parameters
     ----------
     inputs : Inputs
+        The uncertain parameters.
     n : int
-    groups, second_order
+        As in `design`.
+    groups : bool, default True
+        As in `design`.
+    second_order : bool, default False
         As in `design`.
 
     Returns
     -------
     int
+        The number of base points, times g + 2 of g parameters, or 2 g + 2 with second order.
     """
     return n * _plan(inputs, n, groups, second_order).width
 
@@ -150,9 +160,14 @@ def validate(
     Parameters
     ----------
     inputs : Inputs
+        Not used: any will do.
     n : int
+        Not used: any will do.
     of : sequence of str
-    resamples, minimum_events
+        Not used: any will do.
+    resamples : int, default 1000
+        As in `estimate`.
+    minimum_events : int, default 50
         As in `estimate`.
 
     Raises
@@ -182,6 +197,9 @@ def estimate(
 ) -> xr.Dataset:
     """Estimate Sobol indices of an outcome.
 
+    First and total order after Saltelli et al., Comput. Phys. Commun. 181 (2010) 259, second order after
+    Saltelli, Comput. Phys. Commun. 145 (2002) 280, as SALib computes them.
+
     A block with a failed or unknown sample, or without one that it should have, is dropped, for each
     element of the outcome by itself. Indices are undefined (NaN), and say why, where fewer than two
     blocks are left, where the outcome does not vary, and where an outcome of 0 and 1 has too few of
@@ -201,7 +219,7 @@ def estimate(
         Seed of the resampling; by default from the design's, and from the operating system where the
         outcomes do not name it. The results name the one taken, ``resampling_seed``, in their options.
     confidence : float, default 0.95
-        Level of the percentile intervals.
+        Level of the percentile intervals [1].
     resamples : int, default 1000
         Number of resamples.
     second_order : bool, optional
@@ -225,6 +243,8 @@ def estimate(
         If the outcomes are not of a design of this method for these inputs.
     InputError
         If a value is infinite, or an option cannot be used.
+    UnknownNameError
+        If there is no such outcome.
     """
     confidence = check_confidence(confidence)
     _check_options(resamples, minimum_events)

@@ -64,6 +64,7 @@ def boxplots(
     Returns
     -------
     Axes
+        The one given, or that of the new figure.
 
     Raises
     ------

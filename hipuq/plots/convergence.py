@@ -57,6 +57,7 @@ def convergence(
     Returns
     -------
     Axes
+        The one given, or that of the new figure.
 
     Raises
     ------

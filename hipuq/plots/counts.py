@@ -34,7 +34,8 @@ def by_count(results: xr.Dataset, *, exact: xr.Dataset | None = None, ax: Axes |
         ``_max`` over ``count``, and if there are any the limits ``probability_mean_low``, ``_high``. The
         mean is over the patterns alike.
     exact : Dataset, optional
-        Exact results of the same probability, with the same numbers in contact: drawn as bars.
+        Exact results of the same probability, of the same form as `results` and with the same numbers in
+        contact: drawn as bars.
     ax : Axes, optional
         Where to draw; a new figure by default.
 

@@ -88,7 +88,7 @@ def damping_over_frequency(
         As for `root_locus`. Of an undecided mode only the frequency is drawn; a rigid mechanism, of
         frequency 0, has no damping ratio.
     friction : float, optional
-        Friction; the nearest one of the sweep is taken. The largest by default.
+        Friction [1]; the nearest one of the sweep is taken. The largest by default.
     ax : Axes, optional
         Where to draw; a new figure by default.
 

@@ -49,7 +49,7 @@ def fragility(
     ax : Axes, optional
         Where to draw, such as beside other curves; a new figure by default.
     limit : float, optional
-        A tolerated probability, above 0 and below 1. It is drawn, with the neighbours in friction
+        A tolerated probability [1], above 0 and below 1. It is drawn, with the neighbours in friction
         between which the curve first reaches it.
     label : str, optional
         Name of a single curve in the legend.
@@ -60,6 +60,7 @@ def fragility(
     Returns
     -------
     Axes
+        The one given, or that of the new figure.
 
     Raises
     ------

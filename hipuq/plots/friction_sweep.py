@@ -45,6 +45,7 @@ def frequency_over_friction(outcomes: xr.Dataset, modes: Sequence[int], *, ax: A
     Returns
     -------
     Axes
+        The one given, or that of the new figure.
 
     Raises
     ------
@@ -69,6 +70,7 @@ def growth_over_friction(outcomes: xr.Dataset, modes: Sequence[int], *, ax: Axes
     Returns
     -------
     Axes
+        The one given, or that of the new figure.
 
     Raises
     ------
@@ -98,6 +100,7 @@ def lock_in(
     Returns
     -------
     (2, pairs) array of Axes
+        Frequencies in the first row, growth rates in the second, a column for each pair.
 
     Raises
     ------
@@ -126,13 +129,14 @@ def dispersion(outcomes: xr.Dataset, *, axes: Sequence[Axes] | NDArray[Any] | No
     ----------
     outcomes : Dataset
         As for `frequency_over_friction`. Growth rates of undecided modes are left out.
-    axes : sequence of two or three Axes, optional
+    axes : sequence or (2,) or (3,) array of Axes, optional
         For growth rates, for frequencies, and for the frequencies of the closest cluster of modes,
         which cannot be told apart beside the others. A new figure has the third if there is one.
 
     Returns
     -------
-    array of two or three Axes
+    (2,) or (3,) array of Axes
+        Those given, or those of the new figure.
 
     Raises
     ------

@@ -75,6 +75,7 @@ def index_bars(
     Returns
     -------
     Axes
+        The one given, or that of the new figure.
 
     Raises
     ------
@@ -83,6 +84,8 @@ def index_bars(
         then one has to be selected, as by ``results.sel(mode=18)``.
     UnknownNameError
         If a parameter is not in the results.
+    InputError
+        If `parameters` is empty.
     """
     indices = {name: over(results, name, ("parameter",), WAY_OUT) for name in ORDERS}
     here = [str(name) for name in indices["ST"]["parameter"].values]
@@ -136,6 +139,7 @@ def second_order(results: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Returns
     -------
     Axes
+        The one given, or that of the new figure.
 
     Raises
     ------

@@ -39,6 +39,7 @@ def mode_shape(shapes: xr.Dataset, mode: int, *, ax: Axes | None = None, scale: 
     Returns
     -------
     Axes
+        The one given, or that of the new figure.
 
     Raises
     ------

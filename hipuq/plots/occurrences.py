@@ -53,8 +53,8 @@ def occurrence(
     count : int
         Number of oscillators in contact.
     exact : Dataset, optional
-        Exact results of the same probabilities, with the same counts and modes: drawn beside the
-        sampled ones as bars, without their limits.
+        Exact results of the same probabilities, of the same form as `results` and with the same counts and
+        modes: drawn beside the sampled ones as bars, without their limits.
     ax : Axes, optional
         Where to draw; a new figure by default.
     modes : sequence of int, optional
@@ -67,6 +67,7 @@ def occurrence(
     Returns
     -------
     Axes
+        The one given, or that of the new figure.
 
     Raises
     ------
@@ -110,8 +111,10 @@ def occurrence_panels(
         Where to draw; a new figure by default.
     counts : sequence of int, optional
         Numbers in contact; all by default.
-    modes, names : optional
-        As for `occurrence`.
+    modes : sequence of int, optional
+        Modes to show, as for `occurrence`.
+    names : mapping, optional
+        Mode number -> name that the source gives it, as for `occurrence`.
 
     Returns
     -------

@@ -118,7 +118,9 @@ def probability_over(
     SchemaError
         If the results have no probability, have it over more than one parameter, or differ in it.
     InputError
-        If the mapping is empty, or there is no such scale.
+        If the mapping is empty.
+    UnknownNameError
+        If there is no such scale.
     """
     check_name("scale", scale, SCALES)
     if not isinstance(results, xr.Dataset | Mapping):

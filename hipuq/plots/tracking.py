@@ -88,9 +88,16 @@ def lock_in_bracket(outcomes: xr.Dataset, mode: int) -> tuple[float, float]:
     Returns
     -------
     low : float
-        Largest friction below `high` at which the mode is known to be stable; NaN if there is none.
+        Largest friction below `high` at which the mode is known to be stable [1]; NaN if there is none.
     high : float
-        Smallest friction at which it is known to be unstable. Both are NaN if there is none.
+        Smallest friction at which it is known to be unstable [1]. Both are NaN if there is none.
+
+    Raises
+    ------
+    SchemaError
+        If the outcomes lack a variable.
+    InputError
+        If another parameter varies, no sample is left, or the mode is not in the sweep.
     """
     return bracket(follow_modes(outcomes), mode)
 

@@ -23,6 +23,7 @@ def save_outcomes(outcomes: xr.Dataset, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     outcomes : Dataset
+        As from `hipuq.evaluate`, or samples as from `hipuq.design`.
     path : path
         Folder to write; only a Zarr store or nothing is replaced.
 
@@ -30,6 +31,18 @@ def save_outcomes(outcomes: xr.Dataset, path: str | os.PathLike[str]) -> None:
     ------
     StoreError
         If it cannot be written, or something else is there.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import hipuq
+    >>> model = hipuq.models.two_dof("hoffmann2002")
+    >>> outcomes = hipuq.evaluate(model, model.nominal(friction=[0.4, 0.5]))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     hipuq.save_outcomes(outcomes, f"{folder}/outcomes.zarr")
+    ...     again = hipuq.load_outcomes(f"{folder}/outcomes.zarr").load()
+    >>> again.identical(outcomes)
+    True
     """
     folder = Path(path)
     part, old = (folder.with_name(f".{folder.name}.hipuq-{end}") for end in ("part", "saved"))
@@ -59,17 +72,29 @@ def load_outcomes(path: str | os.PathLike[str]) -> xr.Dataset:
     Parameters
     ----------
     path : path
-        Folder that `save_outcomes` wrote.
+        Folder that `save_outcomes` wrote, or `hipuq.evaluate` with a store.
 
     Returns
     -------
     Dataset
-        Identical to what was saved.
+        Identical to what was saved by `save_outcomes`, or written by `hipuq.evaluate` with a store.
 
     Raises
     ------
     StoreError
         If there is no such store, it cannot be read, or hipuq did not write it.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import hipuq
+    >>> model = hipuq.models.two_dof("hoffmann2002")
+    >>> outcomes = hipuq.evaluate(model, model.nominal(friction=[0.4, 0.5]))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     hipuq.save_outcomes(outcomes, f"{folder}/outcomes.zarr")
+    ...     again = hipuq.load_outcomes(f"{folder}/outcomes.zarr").load()
+    >>> again.identical(outcomes)
+    True
     """
     folder = Path(path)
     if (folder / ABOUT).is_file():

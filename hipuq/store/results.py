@@ -24,6 +24,7 @@ def save_results(results: xr.DataTree | xr.Dataset, path: str | os.PathLike[str]
     Parameters
     ----------
     results : DataTree or Dataset
+        As from `hipuq.run` or `hipuq.estimate`; a tree as from `hipuq.run_study`.
     path : path
         File to write; its folder is made.
 
@@ -31,6 +32,22 @@ def save_results(results: xr.DataTree | xr.Dataset, path: str | os.PathLike[str]
     ------
     StoreError
         If it cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import chaospy as cp
+    >>> import hipuq
+    >>> model = hipuq.models.two_dof("hoffmann2002")
+    >>> inputs = model.inputs(friction=cp.Uniform(0.0, 1.0))
+    >>> results = hipuq.run(
+    ...     model, inputs, method="monte_carlo", n=100, of="margin", rng=1
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     hipuq.save_results(results, f"{folder}/results.nc")
+    ...     again = hipuq.load_results(f"{folder}/results.nc")
+    >>> again.to_dataset().identical(results)
+    True
     """
     file = Path(path)
     tree = results if isinstance(results, xr.DataTree) else xr.DataTree(results)
@@ -87,12 +104,29 @@ def load_results(path: str | os.PathLike[str]) -> xr.DataTree:
     Returns
     -------
     DataTree
-        Groups ``<analysis>/<of>``, identical to what was saved.
+        Identical to what was saved: groups ``<analysis>/<of>`` of a study, a single Dataset as the root.
 
     Raises
     ------
     StoreError
-        If there is no such file, or as of `check_ours`.
+        If there is no such file, it cannot be read, another program or a later hipuq wrote it, it is too
+        large, or it leads to other files.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import chaospy as cp
+    >>> import hipuq
+    >>> model = hipuq.models.two_dof("hoffmann2002")
+    >>> inputs = model.inputs(friction=cp.Uniform(0.0, 1.0))
+    >>> results = hipuq.run(
+    ...     model, inputs, method="monte_carlo", n=100, of="margin", rng=1
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     hipuq.save_results(results, f"{folder}/results.nc")
+    ...     again = hipuq.load_results(f"{folder}/results.nc")
+    >>> again.to_dataset().identical(results)
+    True
     """
     file = Path(path)
     if file.is_dir():

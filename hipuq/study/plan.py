@@ -86,6 +86,7 @@ class Study:
     seed : int
         Seed from which each analysis and each problem gets its own.
     analyses : tuple of Analysis
+        In the order in which they run.
     problems : tuple of Problem
         On which methods are compared.
     report : ReportTable
@@ -126,6 +127,7 @@ def load_study(path: str | os.PathLike[str], *, seed: int | None = None) -> Stud
     Returns
     -------
     Study
+        Checked: its ``analyses``, its ``evaluations``, and what `run_study` takes.
 
     Raises
     ------

@@ -43,6 +43,7 @@ def run_study(
     Parameters
     ----------
     study : Study
+        As from `load_study`.
     out : path
         Output folder; gets ``outcomes/<analysis>.zarr``, ``compare/<problem>.jsonl`` and ``results.nc``.
     resume : bool, default False
@@ -50,8 +51,19 @@ def run_study(
         not, and single runs of comparisons are kept, so that the results are those of a run that was not
         cut off; an analysis with a larger n takes the outcomes that are there. Old results of a comparison
         stay in the file until it is complete again.
-    n_jobs, executor, progress, on_error, max_failed, retry_failed
-        As in `hipuq.evaluate`. Comparisons time their runs, so they take threads here whatever the executor.
+    n_jobs : int, optional
+        Threads or processes; all cores by default.
+    executor : str, concurrent.futures.Executor or dask.distributed.Client, optional
+        ``"threads"`` (the default), ``"processes"``, or what runs the blocks instead, as in `hipuq.evaluate`.
+        Comparisons time their runs, so they take threads here whatever the executor.
+    progress : bool, optional
+        Whether to show a progress bar; by default on a terminal.
+    on_error : str, default "mark"
+        ``"mark"`` or ``"raise"``: what becomes of a sample that fails, as in `hipuq.evaluate`.
+    max_failed : float, default 0.5
+        Share of the samples that may fail before the run ends [1], as in `hipuq.evaluate`.
+    retry_failed : bool, default False
+        Whether, with `resume`, samples that failed are evaluated again.
     say : callable, optional
         Gets a line about each analysis, each budget of a comparison, and what the file no longer has.
 
@@ -65,8 +77,10 @@ def run_study(
     Raises
     ------
     InputError
-        If results of a comparison lack what is compared, or its contenders or reference do not agree; each
-        contender runs once for it before the first analysis.
+        If an argument cannot be used, results of a comparison lack what is compared, or its contenders or
+        reference do not agree; each contender runs once for it before the first analysis.
+    ModelError
+        If too many samples fail, or one with ``on_error="raise"``.
     StoreError
         If the folder cannot be written, or what is to be kept in it was made in another way.
     """

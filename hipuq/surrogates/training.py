@@ -64,10 +64,17 @@ def drawn(inputs: Inputs, n: int, seed: int, rows: slice | None, sampler: str, h
     Parameters
     ----------
     inputs : Inputs
-    n, sampler, held_out
+        The uncertain parameters.
+    n : int
         As in `plan`.
     seed : int
+        Seed of the design.
     rows : slice or None
+        Only these rows of it.
+    sampler : str
+        As in `plan`.
+    held_out : float
+        As in `plan`.
 
     Returns
     -------
