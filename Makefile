@@ -46,6 +46,7 @@ bench: $(DEV)  ## Measure speed against NumPy, chaospy and SALib, see docs/speed
 
 docs: $(DOCS)  ## Build the documentation into build/html and run the code in it; ARGS go to pytest
 	$(BIN)/python -m sphinx -W --keep-going -q -j auto -b html docs build/html
+	@echo "documentation: build/html/index.html"
 	$(BIN)/python -m pytest -n auto --dist loadfile --doctest-modules $(PAGES) $(ARGS)
 
 PAGES = README.md CONTRIBUTING.md docs hipuq

@@ -23,7 +23,9 @@ extensions = [
     "tables",
     "study",
 ]
-exclude_patterns = ["extensions", "scripts"]
+exclude_patterns = ["extensions", "scripts", "templates"]
+templates_path = ["templates"]
+smartquotes = False  # quotes in docstrings are those of Python
 
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "colon_fence"]
 myst_heading_anchors = 3
@@ -34,9 +36,8 @@ autosummary_generate = True
 autosummary_ignore_module_all = False
 autodoc_typehints = "none"  # the docstrings say it, with shapes and units
 autodoc_member_order = "bysource"
-numpydoc_show_class_members = True
-numpydoc_show_inherited_class_members = False
-numpydoc_class_members_toctree = False
+autodoc_preserve_defaults = True
+numpydoc_show_class_members = False  # they are on the page of their class, with their docstrings
 numpydoc_xref_param_type = False
 default_role = "code"  # `name` in a docstring
 
@@ -56,7 +57,7 @@ html_theme_options = {
     "pygments_light_style": "tango",
     "pygments_dark_style": "github-dark",
 }
-html_sidebars = {"start": [], "comparison": [], "speed": []}
+html_sidebars = {"start": [], "tutorial": [], "comparison": [], "speed": []}
 
 copybutton_prompt_text = "$ "
 copybutton_only_copy_prompt_lines = True

@@ -49,7 +49,7 @@ inputs.friction = { distribution = "uniform", lower = 0.0, upper = 0.1 }
 ANALYSIS = {"name": "page", "method": "monte_carlo", "n": 8, "of": "any_unstable"}
 
 COMMENT = re.compile(r"<!--\s*(not run|exit):\s*(\S.*?)\s*-->\s*$")
-CAPTION = re.compile(r"(?::\w+:[^\n]*\n)*?:caption:[ ]*(\S+)\n(?::\w+:[^\n]*\n)*\n?")
+CAPTION = re.compile(r"(?::[\w-]+:[^\n]*\n)*?:caption:[ ]*(\S+)\n(?::[\w-]+:[^\n]*\n)*\n?")
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 PRINTED = "printed by the block before"
 
@@ -62,7 +62,9 @@ def blocks(document: Document) -> Iterator[Region]:
         starts.append(starts[-1] + len(line))
     for token in MarkdownIt("commonmark").parse(document.text):
         if token.type == "code_block":
-            raise ValueError(f"{document.path}, line {token.map[0] + 1}: indented code; use ``` and a language")
+            raise ValueError(
+                f"{document.path}, line {token.map[0] + 1}: indented code; use ``` and a language"
+            )
         if token.type != "fence" or (token.info.startswith("{") and "{code-block}" not in token.info):
             continue
         first, last = token.map
@@ -116,7 +118,7 @@ def commands(content: str, code: int, folder: Path) -> str | None:
     """Run the commands of a terminal and compare what they print."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     environment = os.environ | {"PATH": path, "COLUMNS": "100", "NO_COLOR": "1"}
-    for command, want in re.findall(r"^\$ (.*(?:\\\n.*)*)\n((?:(?!\$ ).*\n)*)", content, re.MULTILINE):
+    for command, want in re.findall(r"^\$ ((?:.*\\\n)*.*)\n((?:(?!\$ ).*\n)*)", content, re.MULTILINE):
         done = subprocess.run(
             ["bash", "-c", command],
             cwd=folder,

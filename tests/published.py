@@ -84,8 +84,9 @@ HULTEN_ONSETS = {
     (0.06, 0.02): 0.235551362646,
 }
 HULTEN_ONSET_VANISHING_DAMPING = 0.288675134595
-HULTEN_PROBABILITY = 0.540114940842
-"""Of instability, undamped, friction 0.3, frequency 2 of 75 Hz, frequency 1 uniform on 90 to 110 Hz."""
+HULTEN_PROBABILITY = 0.540114940841
+"""Of instability, undamped, friction 0.3, frequency 2 of 75 Hz, frequency 1 uniform on 90 to 110 Hz: the
+frequencies meet the onset at a ratio of 0.3 + sqrt(1.09), so (75 (0.3 + sqrt(1.09)) - 90) / 20."""
 
 # Closed form, Ziegler's pendulum: the load at which flutter begins and the one at which it ends.
 ZIEGLER_FLUTTER = (7 / 2 - math.sqrt(2), 7 / 2 + math.sqrt(2))

@@ -22,8 +22,8 @@ def analyses(study: Study) -> str:
     rows = [
         [
             code(one.name),
-            code(one.model.label),
-            code(one.method),
+            one.model.label,
+            one.method.replace("_", " "),
             f"{one.n:,}",
             ", ".join(map(code, one.of)) + "".join(f", over {code(name)}" for name in one.over),
             f"{one.evaluations:,}",
@@ -33,10 +33,10 @@ def analyses(study: Study) -> str:
     rows += [
         [
             code(problem.group),
-            code(problem.race.label),
-            ", ".join(one.name for one in problem.race.contenders),
+            problem.race.label,
+            f"{len(problem.race.contenders)} contenders",
             f"{problem.race.budgets[0]:,} to {problem.race.budgets[-1]:,}",
-            f"{problem.race.replicates:,} replicates",
+            f"{code(problem.race.of)}, {problem.race.replicates:,} replicates",
             f"{problem.evaluations:,}",
         ]
         for problem in study.problems
@@ -64,7 +64,7 @@ class StudyHead(SphinxDirective):
             f"It takes {self.options['takes']} for {study.evaluations:,} evaluations; seed {study.seed}.\n",
             analyses(study),
             "",
-            f"````{{dropdown}} The study file, `studies/{name}/study.toml`",
+            f"````{{dropdown}} The study file: studies/{name}/study.toml",  # no code: it would end the fence
             f"```{{literalinclude}} /../studies/{name}/study.toml",
             ":language: toml",
             "```",

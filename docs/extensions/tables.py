@@ -1,4 +1,4 @@
-"""Tables of the reference, generated from the package: schema, models, methods, keys of a study file, command line.
+"""Tables of the reference, generated from the package: schema, models, methods, keys of a study, commands.
 
 A page asks for one by a directive, such as ``{schema} PARAMETERS``. Nothing in these tables is written
 by hand, so none of it can disagree with the code.

@@ -17,13 +17,13 @@ from pathlib import Path
 import chaospy as cp
 import numpy as np
 from matplotlib.figure import Figure
+from pictures import put_figure
 
 import hipuq
 from hipuq import plots
 from hipuq.report.comparison import facts, remarks, tables
 from hipuq.report.table import Table
 
-FIGURES = Path(__file__).parents[1] / "figures"
 REFERENCE = Path(__file__).parents[2] / "studies" / "method_comparison" / "reference.nc"
 CLOSED_FORM = 0.4021698580326567
 """P of hoffmann, friction U(0, 0.8) and k3 scattered by 10 %."""
@@ -54,7 +54,7 @@ def panels(name, draw, races, width=7.0, height=5.6):
     for ax, letter, race in zip(figure.subplots(1, len(races)), "abc", races, strict=False):
         draw(race, ax)
         ax.set_title(f"({letter})", loc="left")
-    figure.savefig(FIGURES / f"methods-{name}.png", dpi=110)
+    put_figure(figure, f"methods-{name}")
 
 
 def more():
