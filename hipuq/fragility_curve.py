@@ -9,9 +9,10 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from hipuq import schema
+from hipuq.contact import CONTACT_PATTERNS
 from hipuq.errors import InputError, SchemaError
 from hipuq.intervals import check_confidence, wilson
-from hipuq.uncertain import only_discrete
+from hipuq.uncertain import described
 
 Array = NDArray[np.float64]
 
@@ -127,11 +128,16 @@ def share_limits(
 
 
 def enumerated(outcomes: xr.Dataset) -> bool:
-    """Say whether outcomes are those of every level of a discrete input alike, so that none was drawn."""
-    if "weight" not in outcomes.coords or not outcomes.attrs.get("inputs"):
+    """Say whether nothing was drawn: outcomes of every level of a discrete input alike, or without inputs."""
+    if not outcomes.attrs.get("inputs"):
         return False
+    inputs = described(str(outcomes.attrs["inputs"]))
+    if any(entry.get("how") != CONTACT_PATTERNS for entry in inputs.values()):
+        return False
+    if "weight" not in outcomes.coords:
+        return not inputs
     times = float(outcomes["weight"].sum())
-    return bool(abs(times - round(times)) < 1e-9 and only_discrete(str(outcomes.attrs["inputs"])))
+    return abs(times - round(times)) < 1e-9
 
 
 def _covered(intervals: Array, weight: Array, grid: Array, swept: tuple[float, float]) -> Array:

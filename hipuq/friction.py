@@ -146,7 +146,8 @@ class FrictionIntegrated:
         Parameters
         ----------
         **distributions
-            Parameter name = a distribution, `relative`, `shift` or `ContactPatterns`; not friction.
+            Parameter name = a distribution, `relative`, `shift` or `ContactPatterns`; not friction. There may
+            be none: then nothing is left to chance.
 
         Returns
         -------
@@ -161,7 +162,7 @@ class FrictionIntegrated:
             If the model has no such parameter.
         """
         self._refuse(distributions)
-        return self.model.inputs(**distributions)
+        return self.model.inputs(**distributions) if distributions else Inputs.from_json("{}")
 
     def nominal(self, **changes: ArrayLike) -> xr.Dataset:
         """Return one sample at the nominal values with changes, see `CEAModel.nominal`.

@@ -212,8 +212,8 @@ class Input:
         return _checked(cls(name, distribution, how, tuple(dims), nominal, each, labels))
 
 
-def only_discrete(text: str) -> bool:
-    """Say whether a description of inputs has discrete ones alone; it may hold what cannot be rebuilt.
+def described(text: str) -> dict[str, dict[str, Any]]:
+    """Return what a description says of each input; it may hold what cannot be rebuilt.
 
     Parameters
     ----------
@@ -222,8 +222,8 @@ def only_discrete(text: str) -> bool:
 
     Returns
     -------
-    bool
-        Also true where there are none.
+    dict
+        Name -> what `Input.to_dict` gave.
 
     Raises
     ------
@@ -231,9 +231,12 @@ def only_discrete(text: str) -> bool:
         If the text is not such a description.
     """
     try:
-        return all(entry["how"] == CONTACT_PATTERNS for entry in json.loads(text).values())
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        found = json.loads(text)
+    except (ValueError, RecursionError) as error:
         raise InputError(f"not a description of inputs: {error}") from error
+    if not (isinstance(found, dict) and all(isinstance(entry, dict) for entry in found.values())):
+        raise InputError(f"not a description of inputs: {text[:60]!r} is no table of tables")
+    return found
 
 
 def _numbers(name: str, nominal: object) -> Array:

@@ -477,3 +477,21 @@ def test_a_support_that_ends_at_a_boundary():
         # chaospy rounds the end of its support.
         assert float(found["onset"][0]) == pytest.approx(one.friction if expected else np.inf, rel=1e-15)
         assert int(found["status"][0]) == 0
+
+
+def test_nothing_else_need_be_uncertain():
+    """One evaluation, no sampling error; methods that share out variance say that there are no inputs."""
+    model = hipuq.integrate_friction(hipuq.models.two_dof("hoffmann2002"), cp.Uniform(0.0, 0.8))
+    inputs = model.inputs()
+    assert len(inputs) == 0
+    results = hipuq.run(model, inputs, method="monte_carlo", n=1, of="probability", rng=0)
+    for name in ("probability", "probability_low", "probability_high"):
+        assert float(results[name]) == pytest.approx(published.HOFFMANN_PROBABILITY, abs=5e-11)
+    assert results.attrs["confidence"] == 1.0
+    outcomes = hipuq.evaluate(model, hipuq.design("monte_carlo", inputs, n=1, rng=0))
+    assert hipuq.fragility(outcomes, [0.4, 0.5])["probability_low"].values.tolist() == [0.0, 1.0]
+    for method in ("sobol", "chaos"):
+        with pytest.raises(InputError, match="there are no inputs"):
+            hipuq.run(model, inputs, method=method, n=16, of="probability", rng=0)
+    with pytest.raises(InputError, match="there are no inputs"):
+        hipuq.models.two_dof().inputs()

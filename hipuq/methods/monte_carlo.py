@@ -210,9 +210,9 @@ def estimate(
     A variable of role ``"verdict"``, a boolean one, and one without units and role that holds
     nothing but 0, 1 and NaN gives probabilities with a Wilson interval; one of role
     ``"probability"`` their mean with a t interval; any other mean and variance. With replicates the
-    interval is that between replicates; where they do not differ, that of the pooled sample. Where the
-    strata leave no input to chance, as with friction integrated and every contact pattern once, there is
-    no sampling error: the limits are what is unknown alone, and the confidence is 1.
+    interval is that between replicates; where they do not differ, that of the pooled sample. Where no
+    input is left to chance, as with friction integrated and every contact pattern once or no other input,
+    there is no sampling error: the limits are what is unknown alone, and the confidence is 1.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def estimate(
         groupings.append((shell, shells_of(values.sizes["sample"])))
     cells, *shells = reduced([values, *_bounds(outcomes, of, values.dims)], groupings)
     table, *bounds = (part.reshaped(strata, replicates) for part in cells)
-    if levels is not None and set(inputs) <= set(inputs.discrete):
+    if set(inputs) <= set(inputs.discrete) and (levels is not None or not inputs):
         confidence = 1.0
     dims = ([] if levels is None else [levels.attrs["dim"]]) + [str(d) for d in values.dims[1:]]
     found = columns(table, bounds, kind, confidence)

@@ -144,6 +144,10 @@ def _plan(inputs: Inputs, n: int, groups: bool, second_order: bool) -> Layout:
         raise InputError(f"n is {n}: the base points must be a power of 2, so take {below} or {2 * below}")
     if n > MAXIMUM_POINTS:
         raise InputError(f"n is {n}: there are at most {MAXIMUM_POINTS} base points")
+    if not inputs:
+        raise InputError(
+            "there are no inputs, so nothing shares the variance: take method 'monte_carlo' with n=1"
+        )
     if inputs.dimension > MAXIMUM_COLUMNS:
         raise InputError(
             f"the inputs have {inputs.dimension} elements: a Sobol design has at most {MAXIMUM_COLUMNS}; "

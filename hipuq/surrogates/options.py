@@ -182,6 +182,8 @@ def discrete_of(inputs: Inputs) -> tuple[str, Inputs]:
     """
     name = inputs.discrete[0] if inputs.discrete else ""
     rest = inputs.without(name) if name else inputs
+    if not inputs:
+        raise InputError("there are no inputs to expand over: take method 'monte_carlo' with n=1")
     if not rest.dimension:
         raise InputError(
             f"polynomial chaos needs a continuous input, there is only {name!r}: its levels can all be "
