@@ -36,7 +36,6 @@ autosummary_generate = True
 autosummary_ignore_module_all = False
 autodoc_typehints = "none"  # the docstrings say it, with shapes and units
 autodoc_member_order = "bysource"
-autodoc_preserve_defaults = True
 numpydoc_show_class_members = False  # they are on the page of their class, with their docstrings
 numpydoc_xref_param_type = False
 default_role = "code"  # `name` in a docstring

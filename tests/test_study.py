@@ -94,9 +94,17 @@ def test_a_later_analysis_changes_no_earlier_one(tmp_path):
     np.testing.assert_array_equal(a, b)
 
 
+def test_an_analysis_with_single_brackets_is_told_so(tmp_path):
+    alone = SEEDED[: SEEDED.rindex("[[analysis]]")].replace("[[analysis]]", "[analysis]")
+    with pytest.raises(StudyError, match=r"analysis: write \[\[analysis\]\], with two brackets"):
+        hipuq.load_study(write(tmp_path, alone))
+
+
 BROKEN = [
     ('name = "ring"', 'name = "rnig"', "did you mean 'ring'"),
     ('preset = "oberst2016"', 'preset = "oberst2017"', "did you mean 'oberst2016'"),
+    ('preset = "oberst2016"', 'presett = "oberst2016"', "did you mean 'preset'"),
+    ('preset = "oberst2016"', 'certifi = "auto"', "did you mean 'certify'"),
     ("[inputs.friction]", "[inputs.frictoin]", "did you mean 'friction'"),
     ('distribution = "uniform"', 'distribution = "unifrom"', "did you mean 'uniform'"),
     ("lower = 0.0", "lowr = 0.0", "did you mean 'lower'"),

@@ -14,13 +14,14 @@ from collections.abc import Iterable
 
 import numpy as np
 from docutils import nodes
-from numpydoc.docscrape import ClassDoc
+from numpydoc.docscrape import ClassDoc, FunctionDoc
 from pydantic import BaseModel
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 import hipuq
 from hipuq import schema
+from hipuq.distributions.families import FAMILIES
 from hipuq.methods import METHODS
 from hipuq.models import MODELS, PRESETS
 
@@ -140,17 +141,44 @@ class Models(Generated):
 
 
 class Methods(Generated):
-    """``{methods} options``: each method with its options and their defaults."""
+    """``{methods} sobol``: the options of a method, with their defaults."""
 
     def markdown(self, argument: str) -> str:
-        """Return a table for each stage that is a function of its own."""
-        rows = []
-        for name, method in METHODS.items():
-            both = {**method.options("design"), **method.options("estimate")}
-            for option, default in both.items():
-                stages = [stage for stage in ("design", "estimate") if option in method.options(stage)]
-                rows.append([code(name), code(option), plain(default), ", ".join(stages)])
-        return table(["method", "option", "default", "stage"], rows)
+        """Return a table: meaning from the docstrings, and which stage takes the option."""
+        method = METHODS[argument]
+        stages = {stage: method.options(stage) for stage in ("design", "estimate")}
+        meanings: dict[str, str] = {}
+        for stage in reversed(stages):
+            for entry in FunctionDoc(getattr(method, stage))["Parameters"]:
+                text = " ".join(entry.desc)
+                if not text.startswith("As in"):
+                    meanings |= dict.fromkeys(entry.name.split(", "), text)
+        return table(
+            ["option", "meaning", "default", "stage"],
+            (
+                [
+                    code(name),
+                    meanings[name],
+                    plain(default),
+                    ", ".join(s for s in stages if name in stages[s]),
+                ]
+                for name, default in {**stages["design"], **stages["estimate"]}.items()
+            ),
+        )
+
+
+class Distributions(Generated):
+    """``{distributions} study``: names of distributions in study files, with their parameters."""
+
+    def markdown(self, argument: str) -> str:
+        """Return a table of names, the parameters that must and those that may be given."""
+        return table(
+            ["distribution", "parameters", "may be left out", "chaospy's name"],
+            (
+                [code(name), *(", ".join(map(code, some)) for some in (needed, optional)), code(theirs)]
+                for name, (theirs, needed, optional) in FAMILIES.items()
+            ),
+        )
 
 
 class Keys(Generated):
@@ -210,6 +238,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
         "results": Results,
         "models": Models,
         "methods": Methods,
+        "distributions": Distributions,
         "keys": Keys,
         "help": Help,
     }.items():

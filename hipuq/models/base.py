@@ -34,6 +34,10 @@ LINEAR = (
 """Limits of every complex eigenvalue analysis with friction, a sentence each without a full stop."""
 
 
+OPTIONS = ("preset", "growth_threshold", "certify")
+"""Arguments of models that are no parameters: a misspelt one may be meant for one of them."""
+
+
 class CEAModel(ABC):
     """A parametric set of matrices, solved by complex eigenvalue analysis.
 

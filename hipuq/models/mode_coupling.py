@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from hipuq.cea import Pencils
 from hipuq.compiled.angles import cosine_and_sine
 from hipuq.errors import InputError, check_name
-from hipuq.models.base import LINEAR, CEAModel
+from hipuq.models.base import LINEAR, OPTIONS, CEAModel
 from hipuq.models.parameter import Parameter
 
 Array = NDArray[np.float64]
@@ -187,7 +187,7 @@ def two_dof(
     check_name("preset of two_dof", preset, PRESETS)
     values = dict(PRESETS[preset])
     for name, value in nominal.items():
-        check_name(f"parameter of {preset}", name, values)
+        check_name(f"parameter of {preset}", name, [*values, *OPTIONS])
         if np.ndim(value) != 0 or not isinstance(value, (int, float, np.number)):
             raise InputError(f"{name} is {value!r}: it must be one number")
         values[name] = float(value)

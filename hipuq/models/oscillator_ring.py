@@ -24,7 +24,7 @@ from hipuq import schema
 from hipuq.cea import CompactPencils, Pencils
 from hipuq.compiled.angles import cosine_and_sine
 from hipuq.errors import InputError, check_name
-from hipuq.models.base import LINEAR, CEAModel
+from hipuq.models.base import LINEAR, OPTIONS, CEAModel
 from hipuq.models.blocks import at_blocks, dyads, sample_last
 from hipuq.models.damping import DAMPING, damping_matrices
 from hipuq.models.parameter import Parameter
@@ -310,7 +310,7 @@ def ring(
         nominal = {**nominal, "friction_angle": np.asarray(nominal["contact_angle"]) + 90.0}
     parameters = {}
     for name in nominal:
-        check_name("parameter of the ring", name, base)
+        check_name("parameter of the ring", name, [*base, *OPTIONS, "oscillators"])
     for name, (value, size, rule) in base.items():
         parameters[name] = Parameter(_nominal(name, nominal.get(name, value), size), **rule)
     model = OscillatorRing(preset, parameters, growth_threshold, certify)

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
 from hipuq.errors import StoreError, StudyError, unknown_name
 from hipuq.evidence import LITERATURE
@@ -45,7 +45,9 @@ class StudyFile(Table):
     analysis : list
         The analyses, in order.
     compare : CompareTable or None
+        Methods compared on problems with a known answer.
     report : ReportTable
+        What the report tells first, and what it shows at nominal values.
     """
 
     title: Words = Field(min_length=1)
@@ -56,6 +58,13 @@ class StudyFile(Table):
     analysis: list[AnalysisTable] = Field(default_factory=list)
     compare: CompareTable | None = None
     report: ReportTable = ReportTable()
+
+    @field_validator("analysis", mode="before")
+    @classmethod
+    def _list(cls, value: Any) -> Any:
+        if isinstance(value, dict):
+            raise ValueError("write [[analysis]], with two brackets: there may be several")
+        return value
 
     @model_validator(mode="after")
     def _whole(self) -> StudyFile:

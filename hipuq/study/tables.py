@@ -52,7 +52,7 @@ class InputTable(BaseModel):
     Attributes
     ----------
     distribution : str
-        One of `hipuq.distributions.DISTRIBUTIONS`, or ``"contact_patterns"``.
+        Its name, such as ``"uniform"``; or ``"contact_patterns"``.
     apply : str
         ``"absolute"``, ``"relative"`` (times 1 + draw) or ``"shift"`` (plus draw).
     each : str or None
@@ -111,20 +111,21 @@ class AnalysisTable(Table):
     name : str
         Name of the group in the results: letters, digits, ``-`` and ``_``.
     method : str
-        Name of a method.
+        ``"monte_carlo"``, ``"chaos"`` or ``"sobol"``.
     n : int
-        Size of the design.
+        Size of the design: samples, for each pattern if stratified; base points of ``"sobol"``.
     integrate_friction : bool
         Whether friction is integrated over its distribution instead of sampled.
     of : list of str
-        Outcomes to analyse; a single one may stand alone.
+        Outcomes to analyse, such as ``"any_unstable"``, ``"unstable"`` or ``"margin"``, with friction
+        integrated ``"probability"``; a single one may stand alone.
     options : dict
         Options of the method.
     over : dict
         Parameter -> values at which the whole analysis is made, each with the same draws; it is then no
         input of it, whatever the study says.
     preset, model, inputs
-        What this analysis has in place of the study's.
+        Keys that this analysis has in place of the study's; the others stay.
     """
 
     name: FileName
