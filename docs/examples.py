@@ -11,7 +11,7 @@ console
 code-block with a caption
     is written to the file that the caption names.
 toml
-    is a part of a study file: it must be a valid one together with `STUDY`.
+    is a part of a study file: with `STUDY` and `ANALYSIS` it must be one that could be run.
 text
     is no code.
 
@@ -36,17 +36,32 @@ from typing import Any
 from markdown_it import MarkdownIt
 from sybil import Document, Example, Region, Sybil
 
-from hipuq.study.file import StudyFile
+import hipuq
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ROOT / "docs" / "figures"
 
-STUDY = """
-title = "Part of a page"
-model = { name = "ring", preset = "oberst2016" }
-inputs.friction = { distribution = "uniform", lower = 0.0, upper = 0.1 }
+STUDY = {
+    "title": 'title = "Part of a page"',
+    "model": 'model = { name = "ring", preset = "oberst2016" }',
+    "friction": 'inputs.friction = { distribution = "uniform", lower = 0.0, upper = 0.1 }',
+}
+ANALYSIS = """
+[[analysis]]
+name = "page"
+method = "monte_carlo"
+n = 8
+of = "any_unstable"
 """
-ANALYSIS = {"name": "page", "method": "monte_carlo", "n": 8, "of": "any_unstable"}
+
+GENERATED = frozenset(
+    "{toctree} {literalinclude} {schema} {results} {models} {methods} {distributions} {keys} {help} "
+    "{study}".split()
+)
+"""Directives that hold no code of their own. Any other fence is code, or refused."""
+
+COLONS = re.compile(r"^:{3,}\{(code|code-block|sourcecode|doctest)\}", re.MULTILINE)
+"""Code in a fence of colons, which is none to Markdown."""
 
 COMMENT = re.compile(r"<!--\s*(not run|exit):\s*(\S.*?)\s*-->\s*$")
 CAPTION = re.compile(r"(?::[\w-]+:[^\n]*\n)*?:caption:[ ]*(\S+)\n(?::[\w-]+:[^\n]*\n)*\n?")
@@ -65,7 +80,11 @@ def blocks(document: Document) -> Iterator[Region]:
             raise ValueError(
                 f"{document.path}, line {token.map[0] + 1}: indented code; use ``` and a language"
             )
-        if token.type != "fence" or (token.info.startswith("{") and "{code-block}" not in token.info):
+        # What a prompt of Python begins with is a quotation in a quotation in a quotation.
+        prompt = token.type == "blockquote_open" and token.level > 1
+        if prompt or (token.type == "inline" and COLONS.search(token.content)):
+            raise ValueError(f"{document.path}, line {token.map[0] + 1}: code that would not run; use ```")
+        if token.type != "fence" or token.info.split(" ")[0] in GENERATED:
             continue
         first, last = token.map
         above = COMMENT.search("".join(lines[:first]).rstrip())
@@ -80,8 +99,12 @@ def evaluate(example: Example) -> str | None:
     """Do with a block what its language says; return what is wrong, if anything is."""
     info, content, kind, said = example.parsed
     language = info.removeprefix("{code-block}").strip()
+    if info.startswith("{eval-rst}"):
+        return "code in it would not run" if re.search(r"code(-block)?::|>>> |doctest::", content) else None
+    if info.startswith("{") and not info.startswith("{code-block}"):
+        return f"{info} is no directive known here: it may hide code"
     if info.startswith("{"):
-        return written(content, language, example.namespace)
+        return written(content, language)
     if kind == "not run":
         return parsed(language, content)
     if language == "python":
@@ -118,9 +141,10 @@ def commands(content: str, code: int, folder: Path) -> str | None:
     """Run the commands of a terminal and compare what they print."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     environment = os.environ | {"PATH": path, "COLUMNS": "100", "NO_COLOR": "1"}
-    for command, want in re.findall(r"^\$ ((?:.*\\\n)*.*)\n((?:(?!\$ ).*\n)*)", content, re.MULTILINE):
+    found = re.findall(r"^\$ ((?:.*\\\n)*.*)\n((?:(?!\$ ).*\n)*)", content, re.MULTILINE)
+    for command, want in found:
         done = subprocess.run(
-            ["bash", "-c", command],
+            ["bash", "-o", "pipefail", "-c", command],
             cwd=folder,
             env=environment,
             stdin=subprocess.DEVNULL,
@@ -133,10 +157,10 @@ def commands(content: str, code: int, folder: Path) -> str | None:
             return f"$ {command}\nended with {done.returncode}, not {code}:\n{done.stdout}"
         if want.strip() and (wrong := compared(want, done.stdout)):
             return f"$ {command}\n{wrong}"
-    return None if content.startswith("$ ") else "a console begins with $ and a command"
+    return None if found and content.startswith("$ ") else "a console begins with $ and a command"
 
 
-def written(content: str, language: str, namespace: dict[str, Any]) -> str | None:
+def written(content: str, language: str) -> str | None:
     """Write the file that the caption names."""
     caption = CAPTION.match(content)
     if caption is None:
@@ -145,6 +169,8 @@ def written(content: str, language: str, namespace: dict[str, Any]) -> str | Non
     file = Path.cwd() / caption[1]
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(body, encoding="utf-8")
+    if file.name == "study.toml":
+        hipuq.load_study(file)
     return parsed(language, body)
 
 
@@ -158,13 +184,14 @@ def parsed(language: str, content: str) -> str | None:
 
 
 def part_of_a_study(content: str) -> None:
-    """Check that a part of a study file is valid."""
+    """Check that a study of which this is a part could be run."""
     given = tomllib.loads(content)
-    base = tomllib.loads(STUDY)
-    whole = base | given | {"inputs": base["inputs"] | given.get("inputs", {})}
-    if not {"analysis", "compare"} & set(given):
-        whole["analysis"] = [ANALYSIS]
-    StudyFile.model_validate(whole)
+    there = {*given, *given.get("inputs", {})}
+    text = "\n".join([*(line for name, line in STUDY.items() if name not in there), content])
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "study.toml"
+        file.write_text(text + ("" if there & {"analysis", "compare"} else ANALYSIS), encoding="utf-8")
+        hipuq.load_study(file)
 
 
 def begin(namespace: dict[str, Any]) -> None:

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from sybil import Document
 
+from hipuq.errors import StudyError
+
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
@@ -68,23 +70,46 @@ def test_commands_must_end_and_print_as_they_should(wrong):
     (said,) = wrong(fence("console", "$ exit 3"))
     assert "ended with 3, not 0" in said
     assert wrong(fence("console", "$ exit 3", above="<!-- exit: 3 -->")) == [None]
+    (said,) = wrong(fence("console", "$ false | cat"))
+    assert "ended with 1" in said
     (said,) = wrong(fence("console", "echo one"))
     assert "begins with $" in said
 
 
 def test_a_block_with_a_caption_is_a_file(wrong, tmp_path):
-    text = fence("{code-block} toml", ":caption: own/study.toml", "", 'title = "x"')
-    assert wrong(text + fence("console", "$ cat own/study.toml", 'title = "x"')) == [None, None]
-    assert (tmp_path / "own" / "study.toml").read_text() == 'title = "x"\n'
+    text = fence("{code-block} toml", ":caption: own/settings.toml", "", 'title = "x"')
+    assert wrong(text + fence("console", "$ cat own/settings.toml", 'title = "x"')) == [None, None]
+    assert (tmp_path / "own" / "settings.toml").read_text() == 'title = "x"\n'
     (said,) = wrong(fence("{code-block} toml", 'title = "x"'))
     assert ":caption: NAME" in said
 
 
-def test_parts_of_a_study_file_must_be_valid(wrong):
+def test_parts_of_a_study_file_must_be_such_that_they_could_be_run(wrong):
     good = ["[[analysis]]", 'name = "a"', 'method = "sobol"', "n = 8", 'of = "margin"']
-    assert wrong(fence("toml", *good)) == [None]
-    with pytest.raises(ValueError, match="damping"):
-        wrong(fence("toml", *good, "damping = 1"))
+    contact = ["[inputs.contact]", 'distribution = "contact_patterns"', "in_contact = [8, 9]"]
+    assert wrong(fence("toml", *good) + fence("toml", *contact)) == [None, None]
+    for bad in ("damping = 1", 'of = "margins"', "options = { nosuch = 3 }"):
+        text = [line for line in good if not line.startswith(bad[:3])]
+        with pytest.raises(StudyError):
+            wrong(fence("toml", *text, bad))
+    with pytest.raises(StudyError):
+        wrong(fence("toml", *[line.replace("contact]", "contcat]") for line in contact]))
+    with pytest.raises(StudyError):
+        wrong(fence("{code-block} toml", ":caption: study.toml", *good))
+
+
+@pytest.mark.parametrize("kind", ["dropdown", "note", "code", "sourcecode", "doctest"])
+def test_code_cannot_hide_in_a_directive(wrong, kind):
+    (said,) = wrong(fence(f"{{{kind}}} python", "1 / 0"))
+    assert "no directive known" in said
+
+
+def test_code_cannot_hide_beside_the_fences(wrong):
+    (said,) = wrong(fence("{eval-rst}", ".. code-block:: python", "", "   1 / 0"))
+    assert "would not run" in said
+    for text in (":::{code-block} python\n1 / 0\n:::\n", ">>> 1 / 0\n"):
+        with pytest.raises(ValueError, match="code that would not run"):
+            wrong(text)
 
 
 def test_what_is_not_run_says_why_and_is_still_parsed(wrong):
@@ -106,10 +131,13 @@ def test_code_without_a_language_is_refused(wrong):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_every_block_of_a_page_is_one_that_the_runner_knows(page):
     document = Document.parse(str(page), examples.blocks)
-    known = {"python", "output", "console", "toml", "text"}
+    known = {"python", "output", "console", "toml", "text", "{eval-rst}"}
     for example in document.examples():
         info = example.parsed[0]
         assert info in known or info.startswith("{code-block}"), f"{page}, line {example.line}: {info}"
+    # MyST takes such a line for a comment: its text would be lost without a warning.
+    lines = page.read_text(encoding="utf-8").splitlines()
+    assert [number for number, line in enumerate(lines, 1) if re.match(r"\s*%", line)] == []
 
 
 def test_every_study_has_its_page_in_the_gallery():

@@ -10,6 +10,7 @@ matched one to one so that distances add up to the least, over the largest modul
 and median error of each, and in how many matrices the kernel's error is the smaller one.
 """
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -88,5 +89,8 @@ def main(count: int, seed: int) -> None:
 
 
 if __name__ == "__main__":
-    given = [int(word) for word in sys.argv[1:]]
-    main(*(given + [1000, 1][len(given) :]))
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("matrices", type=int, nargs="?", default=1000)
+    parser.add_argument("seed", type=int, nargs="?", default=1)
+    options = parser.parse_args()
+    main(options.matrices, options.seed)

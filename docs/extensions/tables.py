@@ -196,6 +196,8 @@ class Keys(Generated):
         rows = []
         for key, field in form.model_fields.items():
             default = "needed" if field.is_required() else plain(field.get_default(call_default_factory=True))
+            if not meanings[key]:
+                raise ValueError(f"{argument} does not say what {key!r} means")
             rows.append([code(key), meanings[key], code(_kind(field.annotation)), default])
         return table(["key", "meaning", "type", "default"], rows)
 

@@ -67,11 +67,11 @@ class Settings(Table):
     Attributes
     ----------
     budgets : list of int
-        Numbers of evaluations, rising.
+        Numbers of evaluations, rising; needed here or in each problem.
     replicates : int
         Independent repetitions.
     of : str
-        Outcome analysed.
+        Outcome analysed; needed here or in each problem.
     quantity : str or None
         The result that is compared; by default the probability or mean over everything.
     baseline : str or None
@@ -79,7 +79,8 @@ class Settings(Table):
     confidence : float
         Level of the limits told of errors and coverage.
     reference : float, dict, ExactTable, ResultsTable or None
-        The answer.
+        The answer, needed here or in each problem: a number, a number by parameter, ``{ exact = true }`` with
+        friction integrated and every level once, or ``{ results = FILE, analysis = NAME }``.
     source : str
         Where the reference comes from.
     """
@@ -134,9 +135,9 @@ class ProblemTable(Settings):
     contenders : list of str or None
         Those that take part; all by default.
     model : dict
-        With a ``name`` a model of its own, else options in place of the study's.
+        With a ``name`` a model of its own, else options that replace those of the study; the others stay.
     inputs : dict
-        All of them with a model of its own, else in place of the study's.
+        All of them with a model of its own, else inputs that replace those of the study; the others stay.
     """
 
     name: FileName
