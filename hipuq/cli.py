@@ -170,7 +170,7 @@ def onset(
     smallest: Annotated[float, typer.Option("--min", help="Smallest friction.")] = 0.0,
     largest: Annotated[float, typer.Option("--max", help="Largest friction.")] = 0.1,
 ) -> None:
-    """Print the unstable friction intervals of one configuration, each boundary certified."""
+    """Print the unstable friction intervals of one configuration, and which boundaries are certified."""
     from hipuq.configuration import configured
     from hipuq.models import unstable_friction
     from hipuq.report.configuration import show_onset

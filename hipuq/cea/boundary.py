@@ -18,7 +18,7 @@ from hipuq.cea.structured import structured_eigenvalues
 from hipuq.errors import InputError
 
 SIDE = 1e-12
-"""Relative distance from a boundary at which the verdicts on both its sides are certified."""
+"""Relative distance from a boundary at which both its sides are looked at for the certificate."""
 
 CLOSE = 1e-6
 """Boundaries nearer to each other than this are looked at together, see `_beyond_rounding`."""
@@ -40,7 +40,7 @@ class Boundary:
     frequency : float
         Frequency there [Hz]: common to the pair, 0 for divergence.
     certified : bool
-        Whether the verdicts at (1 - SIDE) and (1 + SIDE) times the friction are proved.
+        Whether the change is proved between (1 - SIDE) and (1 + SIDE) times the friction.
     """
 
     friction: float
@@ -104,7 +104,7 @@ class _Solved:
 
     @property
     def sides(self) -> tuple[float, float]:
-        """The frictions below and above at which verdicts are proved."""
+        """The frictions below and above between which the change is proved."""
         return self.friction - SIDE * abs(self.friction), self.friction + SIDE * abs(self.friction)
 
 

@@ -1,7 +1,7 @@
 """The friction and frequency at which an eigenvalue lies on a line, to the last digit of a double.
 
 Newton's method for ``P(g + i omega, mu) x = 0``, ``c^H x = 1`` in x, omega and mu. The steps are solved for
-in doubles, the residuals formed in whole numbers of 200 bits: iterative refinement, which wins some
+in doubles, the residuals formed in whole numbers of 240 bits: iterative refinement, which wins some
 digits with every step however ill-conditioned the crossing is.
 """
 

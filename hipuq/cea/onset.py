@@ -1,4 +1,4 @@
-"""Every friction at which the number of unstable modes changes, each certified from both sides.
+"""The frictions at which the number of unstable modes changes, certified from both sides where possible.
 
 Undamped pencils A0 + mu A1. Where two real eigenvalues w merge, or a complex pair parts, their squared
 gap passes through zero and is analytic there (Kirillov and Seyranian, SIAM J. Appl. Math. 64 (2004)
