@@ -140,7 +140,7 @@ class FrictionIntegrated:
         """The model as JSON-able options: what rebuilds it."""
         return {**self.model.options, "integrated": {FRICTION: dict(self.distribution.description)}}
 
-    def inputs(self, **distributions: object) -> Inputs:
+    def inputs(self, /, **distributions: object) -> Inputs:
         """Return inputs that know the model's nominal values, see `CEAModel.inputs`.
 
         Parameters
@@ -164,7 +164,7 @@ class FrictionIntegrated:
         self._refuse(distributions)
         return self.model.inputs(**distributions) if distributions else Inputs.from_json("{}")
 
-    def nominal(self, **changes: ArrayLike) -> xr.Dataset:
+    def nominal(self, /, **changes: ArrayLike) -> xr.Dataset:
         """Return one sample at the nominal values with changes, see `CEAModel.nominal`.
 
         Parameters

@@ -7,12 +7,13 @@ from multiprocessing import get_context
 import chaospy as cp
 import numpy as np
 import pytest
-from test_matrices import CONTACT, NONE, SPRINGS, hoffmann
+from test_matrices import CONTACT, NONE, SPRINGS, hoffmann, random_matrices
 
 import hipuq
 from hipuq import schema
 from hipuq.errors import InputError, StoreError
 from hipuq.models import Parameter, from_matrices
+from hipuq.models.matrices import MatrixModel
 
 
 def test_another_matrix_is_another_model(tmp_path):
@@ -109,3 +110,69 @@ def test_own_parameters_of_a_subclass():
     unnamed = base.parameters | {"pad_angle": Parameter(np.array(10.0))}
     with pytest.raises(InputError, match="schema does not know the parameter 'pad_angle'"):
         Inclined(base.base, base.parts, unnamed, 0, preset="inclined")
+    other = base.parameters | {"damping_1": angle}
+    with pytest.raises(InputError, match=r"'damping_1' is the relative damping 1 .* take another name"):
+        Inclined(base.base, base.parts, other, 0, preset="inclined")
+
+
+def test_a_part_called_self():
+    model = from_matrices([1, 1], SPRINGS, NONE, parts={"self": CONTACT})
+    for one in (model, hipuq.integrate_friction(model, cp.Uniform(0.0, 0.8))):
+        assert one.nominal(self=1.1)["self"].item() == 1.1
+        assert one.inputs(self=cp.Uniform(0.9, 1.1)).dimension == 1
+
+
+def test_a_study_is_no_model(tmp_path):
+    with pytest.raises(InputError, match="study is MatrixModel"):
+        hipuq.run_study(hoffmann(), tmp_path)
+
+
+def with_parts(kind, size, damping, nominal=0.0):
+    """Return a model with a full mass and a part of each kind, all of it of a size."""
+    base, change = random_matrices(1, 5), random_matrices(2, 5)
+    if not damping:
+        for one in (base, change):
+            del one["damping"]
+    parts = {f"of_{name}": {name: size * one} for name, one in change.items()}
+    given = {f"of_{name}": nominal / size for name in change}
+    given |= {} if damping else {"damping_ratio": 0.02, "mass_damping": 0.01, "stiffness_damping": 0.001}
+    return kind(from_matrices(**base, parts=parts, nominal=given))
+
+
+@pytest.mark.parametrize("damping", [False, True])
+@pytest.mark.parametrize("nominal", [0.0, 0.1])
+def test_derivatives_are_exact_for_parts_of_any_size(damping, nominal):
+    """Those of differences, which a subclass takes; and the same of a part 1e12 times smaller or larger."""
+
+    class Differences(MatrixModel):
+        def __init__(self, one):
+            super().__init__(one.base, one.parts, one.parameters, 0, preset=one.preset)
+
+    by_differences = with_parts(Differences, 1.0, damping, nominal)
+    found = hipuq.unstable_friction(by_differences, upper=3.0)
+    place = {name: found[name].values[0] for name in ("friction", "frequency")}
+    theirs = hipuq.onset_sensitivity(by_differences, **place)
+    for size in (1e-12, 1.0, 1e12):
+        ours = hipuq.onset_sensitivity(with_parts(lambda one: one, size, damping, nominal), **place)
+        assert set(ours) == set(theirs)
+        for name in ours:
+            scale = size if name.startswith("of_") else 1.0
+            assert ours[name].item() / scale == pytest.approx(theirs[name].item(), rel=1e-8), (name, size)
+
+
+def test_derivative_with_respect_to_a_ground_spring():
+    """1 N/m beside 1e11 N/m, diagonal mass, undamped: the closed form of two degrees of freedom."""
+    stiffness, friction = (
+        1e11 * np.array([[3.0, 1.0], [1.0, 2.0]]),
+        1e11 * np.array([[0.0, -1.0], [0.0, 0.0]]),
+    )
+    model = from_matrices(
+        [1, 1], stiffness, friction, parts={"ground": {"stiffness": [[1, 0], [0, 0]]}}, nominal={"ground": 0}
+    )
+    # (k11 - k22)^2 / 4 + k12 (k12 - mu k) = 0, so d mu / d k11 = (k11 - k22) / (2 k12 k).
+    found = hipuq.unstable_friction(model, upper=2.0)
+    assert found["friction"].item() == pytest.approx(1.25, rel=1e-12)
+    place = {name: found[name].item() for name in ("friction", "frequency")}
+    slopes = hipuq.onset_sensitivity(model, **place)
+    assert slopes["ground"].item() == pytest.approx(0.5e-11, rel=1e-12)
+    assert np.isnan(slopes["damping_ratio"])

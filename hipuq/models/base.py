@@ -154,7 +154,7 @@ class CEAModel(ABC):
             "nominal": changed,
         }
 
-    def inputs(self, **distributions: object) -> Inputs:
+    def inputs(self, /, **distributions: object) -> Inputs:
         """Return inputs that know this model's nominal values and lengths.
 
         Parameters
@@ -180,7 +180,7 @@ class CEAModel(ABC):
             check_name("parameter", name, nominal)
         return Inputs.around(distributions, nominal)
 
-    def nominal(self, **changes: ArrayLike) -> xr.Dataset:
+    def nominal(self, /, **changes: ArrayLike) -> xr.Dataset:
         """Return one sample at the nominal values, with `changes`.
 
         Parameters

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,10 +11,18 @@ from numpy.typing import NDArray
 
 from hipuq import schema
 from hipuq.cea import Pencils
-from hipuq.errors import InputError, check_name
+from hipuq.cea.sensitivity import Derivatives
+from hipuq.errors import InputError
 from hipuq.models.base import LINEAR, CEAModel
-from hipuq.models.damping import DAMPING, damping_matrices
-from hipuq.models.matrix_input import KINDS, check_definite, check_mechanisms, checked
+from hipuq.models.damping import DAMPING, damping_derivative, damping_matrices
+from hipuq.models.matrix_input import (
+    KINDS,
+    check_definite,
+    check_mechanisms,
+    checked,
+    nominal_values,
+    without_damping,
+)
 from hipuq.models.parameter import Parameter
 from hipuq.sampling import check_count
 
@@ -112,6 +120,37 @@ class MatrixModel(CEAModel):
                 total += values[name].reshape(-1, *[1] * base.ndim) * part[kind]
         return total
 
+    def derivatives(self, values: Mapping[str, Array], names: Iterable[str]) -> Derivatives:
+        """Return the exact derivatives of the matrices of one sample.
+
+        Parameters
+        ----------
+        values : mapping
+            Every parameter, each (1,).
+        names : iterable of str
+            Parameters with respect to which, all but friction.
+
+        Returns
+        -------
+        Derivatives
+        """
+        mass, stiffness = self.total("mass", values), self.total("stiffness", values)
+        found: dict[str, list[Array]] = {kind: [] for kind in KINDS}
+        for name in names:
+            part = self.parts.get(name, {})
+            own = {kind: part.get(kind, np.zeros_like(base)) for kind, base in self.base.items()}
+            if "damping" not in self.base:
+                if name in DAMPING:  # in each of them it is linear
+                    made = damping_matrices(mass, stiffness, {name: np.ones(1)})
+                    assert made is not None
+                    own["damping"] = made[0]
+                else:
+                    changes = own["mass"], own["stiffness"]
+                    own["damping"] = damping_derivative(mass[0], stiffness[0], *changes, values)
+            for kind, one in own.items():
+                found[kind].append(one)
+        return Derivatives(**{kind: np.stack(every) for kind, every in found.items()})
+
 
 def from_matrices(
     mass: object,
@@ -143,15 +182,17 @@ def from_matrices(
     damping : (n, n) array, optional
         C [N s/m].
     parts : mapping, optional
-        Name of a parameter -> the matrices that it scales: ``"mass"``, ``"stiffness"``,
-        ``"friction_stiffness"``, ``"damping"``, one or several, such as those of one contact.
+        Name of a parameter, one that hipuq does not use itself -> the matrices that it scales: ``"mass"``,
+        ``"stiffness"``, ``"friction_stiffness"``, ``"damping"``, one or several, such as those of one
+        contact.
     nominal : mapping, optional
         Nominal values other than 1 for a part [1], and 0 for ``friction`` and the damping parameters, in the
         units of the schema.
     mechanisms : int, default 0
         Number of motions that neither stiffness nor friction resists, at any value of the parameters:
         of rigid bodies, of parts without a spring. Rounding hides them from the solver. Too few are an
-        error here, at nominal values; too many leave every sample undecided.
+        error here, at nominal values; too many leave samples undecided, or take a soft motion for one that
+        nothing resists: count them from the structure, not from the message.
     label : str, default "matrices"
         What results call it.
     growth_threshold : float, default 0
@@ -182,6 +223,9 @@ def from_matrices(
     The cost of a sample grows with the third power of n, and faster where friction is integrated: reduce
     large models to some ten modes first. Verdicts hold for the matrices as given, not for the reduction.
 
+    Values at which a part that holds the structure vanishes have more mechanisms than declared, and verdicts
+    there are worth nothing: leave them out.
+
     Examples
     --------
     The model of Hoffmann et al. (2002), whose contact spring comes with its friction:
@@ -198,29 +242,26 @@ def from_matrices(
     >>> round(hipuq.unstable_friction(model, upper=0.8)["friction"].item(), 12)
     0.472377492973
     """
-    if not isinstance(label, str) or not label:
-        raise InputError(f"label is {label!r}: it must be a name")
+    if not isinstance(label, str) or not label.isprintable() or not label.strip():
+        raise InputError(f"label is {label!r}: it must be a name, in one line")
     given = zip(KINDS, (mass, stiffness, friction_stiffness, damping), strict=True)
     base, scaled = checked(dict(given), parts)
+    missing = without_damping(base, scaled)
     values = {"friction": 0.0} | dict.fromkeys(scaled, 1.0)
-    if "damping" not in base:
-        all_stiffness = [own["stiffness"] for own in (base, *scaled.values()) if "stiffness" in own]
-        symmetric = all(np.array_equal(one, one.T) for one in all_stiffness)
-        values |= dict.fromkeys(DAMPING if symmetric else DAMPING[1:], 0.0)
-    for name, value in dict(nominal or {}).items():
-        check_name("parameter", name, values)
-        if not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
-            raise InputError(f"nominal {name} is {value!r}: it must be one number")
-        values[name] = float(value)
+    values |= dict.fromkeys([name for name in DAMPING if name not in missing], 0.0)
+    values |= nominal_values(nominal, values, missing)
     parameters = {}
     for name, value in values.items():
         variable = schema.Variable(f"factor of {name}") if name in scaled else None
         parameters[name] = Parameter(np.array(value), 0.0 if name in DAMPING else -np.inf, variable=variable)
+    size = len(base["stiffness"])
+    if check_count("mechanisms", mechanisms, 0) >= size:
+        raise InputError(f"mechanisms is {mechanisms}: the matrices have {size} rows, so it must be less")
     model = MatrixModel(
         base,
         scaled,
         parameters,
-        check_count("mechanisms", mechanisms, 0),
+        int(mechanisms),
         preset=label,
         growth_threshold=growth_threshold,
         certify=certify,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,9 @@ from numpy.typing import NDArray
 from hipuq import schema
 from hipuq.cea import Pencils
 from hipuq.cea.bounds import EPS
+from hipuq.cea.pencils import LARGEST
 from hipuq.errors import InputError, check_name
+from hipuq.models.damping import DAMPING
 
 Array = NDArray[np.float64]
 
@@ -28,7 +31,8 @@ ANY_FRICTION = 1 / np.pi
 TAKEN = {
     *(schema.PARAMETERS | schema.OUTCOMES | schema.INTEGRATED | schema.COORDINATES),
     *(dim for variable in schema.INTEGRATED.values() for dim in variable.dims),
-    *(*schema.RESULT_DIMS, "status", "decided_by", "pair"),
+    *(*schema.RESULT_DIMS, "status", "decided_by", "pair", "failure_message", "failed_sample"),
+    *("seconds", "failed", "undecided", "evaluations"),
 }
 """Names that mean something else in samples, outcomes or results."""
 
@@ -41,7 +45,7 @@ def checked(
     Parameters
     ----------
     given : mapping
-        Kind -> matrix, None for one that there is not.
+        Kind -> matrix; the damping may be None, for none.
     parts : mapping or None
         Name of a parameter -> matrices by kind.
 
@@ -58,6 +62,9 @@ def checked(
     InputError, UnknownNameError
         If one cannot be used.
     """
+    for kind, one in given.items():
+        if one is None and kind != "damping":
+            raise InputError(f"{kind} is missing: give zeros if parts hold all of it")
     size = len(_matrix("stiffness", given["stiffness"]))
     base = {kind: _matrix(kind, one, size) for kind, one in given.items() if one is not None}
     scaled = {
@@ -91,12 +98,75 @@ def check_mechanisms(pencils: Pencils) -> None:
     """
     stiffness = replace(pencils, friction=np.array([ANY_FRICTION])).reduced()[0][0]
     singular = np.linalg.svd(stiffness, compute_uv=False)
-    found = int((singular <= 10 * len(singular) * EPS * singular[0]).sum())
+    n = len(singular)
+    # Relative to the norm, not to entries: a projection leaves rounding of that size in every entry.
+    found = int((singular <= 10 * n * EPS * singular[0]).sum())
+    if found == n:
+        raise InputError("nothing is resisted: stiffness and friction are zero at the nominal values")
     if found > pencils.mechanisms[0]:
         raise InputError(
-            f"stiffness and friction resist {found} motions by rounding only, and mechanisms is "
-            f"{pencils.mechanisms[0]}: give mechanisms={found}, or hold the structure"
+            f"at the nominal values stiffness and friction resist {found} of {n} motions by less than "
+            f"rounding shows, and mechanisms is {pencils.mechanisms[0]}: if nothing ever resists them give "
+            f"mechanisms={found}; if a part does that is 0 there, give it a value; if they are only soft, "
+            "reduce the matrices to modes, or soften what stands for a rigid joint"
         )
+
+
+def without_damping(base: Mapping[str, Array], scaled: Mapping[str, Mapping[str, Array]]) -> dict[str, str]:
+    """Return the damping parameters that matrices leave no room for, each with the reason.
+
+    Parameters
+    ----------
+    base, scaled : mapping
+        As `checked` returns them.
+    """
+    if "damping" in base:
+        reason = "is none where damping matrices are given: scale one of these by a part"
+        return {name: f"{name} {reason}" for name in DAMPING}
+    for of, own in {"": base, **{f" of {name}": part for name, part in scaled.items()}}.items():
+        apart = _halves_apart(own["stiffness"]) if "stiffness" in own else 0.0
+        if apart > 0:
+            text = (
+                f"damping_ratio needs a symmetric stiffness: the halves of stiffness{of} differ by "
+                f"{apart:.2g} of its largest entry; give (K + K.T) / 2 if that is rounding"
+            )
+            return {"damping_ratio": text}
+    return {}
+
+
+def nominal_values(nominal: object, allowed: Iterable[str], missing: Mapping[str, str]) -> dict[str, float]:
+    """Return nominal values as numbers.
+
+    Parameters
+    ----------
+    nominal : mapping or None
+        Name of a parameter -> number.
+    allowed : iterable of str
+        Names of parameters.
+    missing : mapping
+        Name of a parameter that there could be -> why it is not there.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        If one cannot be used.
+    """
+    if nominal is None:
+        return {}
+    if not isinstance(nominal, Mapping):
+        raise InputError(f"nominal is {type(nominal).__name__}: it must map parameters to numbers")
+    found = {}
+    for name, value in nominal.items():
+        if name in missing:
+            raise InputError(missing[name])
+        check_name("parameter", name, allowed)
+        if not isinstance(value, Real) or isinstance(value, bool):
+            raise InputError(f"nominal {name} is {value!r}: it must be one number")
+        try:
+            found[name] = float(value)
+        except OverflowError:
+            raise InputError(f"nominal {name} does not fit a double") from None
+    return found
 
 
 def _checked_parts(parts: object) -> Mapping[str, Mapping[str, object]]:
@@ -123,14 +193,24 @@ def _checked_parts(parts: object) -> Mapping[str, Mapping[str, object]]:
 def _matrix(kind: str, value: Any, size: int | None = None, of: str = "") -> Array:
     """Return a matrix as an array of its own; a mass may be given by its diagonal."""
     what = f"{kind}{of}"
+    if value is None:
+        raise InputError(f"{what} is None: leave it out")
+    if np.ma.is_masked(value):
+        raise InputError(f"{what} has masked entries: it must have all of them")
     try:
         array = np.array(value.toarray() if hasattr(value, "toarray") else value)
     except ValueError:
         raise InputError(f"{what} is no matrix: its rows have different lengths") from None
     if array.dtype.kind == "c":
         raise InputError(f"{what} is complex: it must be real, structural damping goes into damping")
-    if array.dtype.kind not in "biuf":
-        raise InputError(f"{what} holds {array.dtype}: it must hold numbers")
+    try:
+        if array.dtype.kind not in "biufO":
+            raise TypeError
+        with np.errstate(over="ignore"):
+            # Plus zero, so that -0 and 0 are the same matrix.
+            array = array.astype(np.float64) + 0.0
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{what} holds {array.dtype}: it must hold numbers that fit a double") from None
     if kind == "mass" and array.ndim == 1:
         array = np.diag(array)
     if array.ndim != 2 or array.shape[0] != array.shape[1] or not array.size:
@@ -142,15 +222,20 @@ def _matrix(kind: str, value: Any, size: int | None = None, of: str = "") -> Arr
         row, column = bad[0]
         value = array[row, column]
         raise InputError(f"{what} is {value} in row {row + 1}, column {column + 1}: it must be finite")
-    # Plus zero, so that -0 and 0 are the same matrix.
-    array = array.astype(np.float64) + 0.0
-    apart = np.abs(array - array.T).max() / (np.abs(array).max() or 1.0)
+    if np.abs(array).max() > LARGEST:
+        raise InputError(f"{what} holds a value above {LARGEST:g}: choose other units")
+    apart = _halves_apart(array)
     if kind == "mass" and apart > SYMMETRIC:
         raise InputError(
             f"{what} is not symmetric, its halves differ by {apart:.2g} of its largest entry: give both, "
             "and their mean, (mass + mass.T) / 2, if they differ by the rounding of another program"
         )
     return (array + array.T) / 2 if apart <= SYMMETRIC else array
+
+
+def _halves_apart(matrix: Array) -> float:
+    """Return the largest difference of an entry and its mirror image, relative to the largest entry."""
+    return float(np.abs(matrix - matrix.T).max() / (np.abs(matrix).max() or 1.0))
 
 
 def _is_diagonal(matrix: Array) -> bool:

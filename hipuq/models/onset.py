@@ -19,7 +19,7 @@ _TABLE = {
     "unstable_above": ("boundary", "unstable modes above it", "1"),
     "mode": ("boundary", "number of the mode that changes, by frequency, on the unstable side", "1"),
     "frequency": ("boundary", "frequency of that mode there", "Hz"),
-    "certified": ("boundary", "verdicts proved at 1e-12 below and above it", "1"),
+    "certified": ("boundary", "change proved between 1e-12 below and above it", "1"),
     "start": ("interval", "lower end of an interval with an unstable mode", "1"),
     "end": ("interval", "upper end of an interval with an unstable mode", "1"),
     "mode_number": ("mode_interval", "number of the mode, by frequency", "1"),

@@ -50,21 +50,26 @@ class Parameter:
         Returns
         -------
         Variable
-            Its own, or that of the schema.
+            That of the schema, or its own.
 
         Raises
         ------
         InputError
-            If neither it nor the schema has them.
+            If neither it nor the schema has them, or both do and differ.
         """
-        if self.variable is not None:
-            return self.variable
-        if name not in schema.PARAMETERS:
+        known = schema.PARAMETERS.get(name)
+        if known is not None and self.variable not in (None, known):
+            raise InputError(
+                f"{name!r} is the {known.long_name} ({known.units}) in the schema: "
+                "take another name for a parameter that means something else"
+            )
+        found = known or self.variable
+        if found is None:
             raise InputError(
                 f"the schema does not know the parameter {name!r}: "
                 "say what it is, Parameter(..., variable=hipuq.schema.Variable(...))"
             )
-        return schema.PARAMETERS[name]
+        return found
 
     def check(self, name: str, values: Array) -> None:
         """Check values.

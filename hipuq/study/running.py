@@ -77,13 +77,18 @@ def run_study(
     Raises
     ------
     InputError
-        If an argument cannot be used, results of a comparison lack what is compared, or its contenders or
-        reference do not agree; each contender runs once for it before the first analysis.
+        If it is no study, an argument cannot be used, results of a comparison lack what is compared, or its
+        contenders or reference do not agree; each contender runs once for it before the first analysis.
     ModelError
         If too many samples fail, or one with ``on_error="raise"``.
     StoreError
         If the folder cannot be written, or what is to be kept in it was made in another way.
     """
+    if not isinstance(study, Study):
+        raise InputError(
+            f"study is {type(study).__name__}: it must be one that hipuq.load_study returned; "
+            "hipuq.run analyses a model"
+        )
     folder = Path(out)
     how = How(n_jobs, executor, progress, on_error=on_error, max_failed=max_failed)
     if resume:
