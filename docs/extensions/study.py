@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def analyses(study: Study) -> str:
-    """Return the analyses and comparisons of a study as a table in Markdown."""
+    """Return the analyses of a study as a table in Markdown, and its comparisons as one."""
     rows = [
         [
             code(one.name),
@@ -30,18 +30,22 @@ def analyses(study: Study) -> str:
         ]
         for one in study.analyses
     ]
-    rows += [
+    raced = [
         [
-            code(problem.group),
+            code(problem.group.removeprefix("compare/")),
             problem.race.label,
-            f"{len(problem.race.contenders)} contenders",
+            len(problem.race.contenders),
             f"{problem.race.budgets[0]:,} to {problem.race.budgets[-1]:,}",
-            f"{code(problem.race.of)}, {problem.race.replicates:,} replicates",
+            f"{problem.race.replicates:,}",
             f"{problem.evaluations:,}",
         ]
         for problem in study.problems
     ]
-    return table(["analysis", "model", "method", "n", "of", "evaluations"], rows)
+    tables = (
+        (["analysis", "model", "method", "n", "of", "evaluations"], rows),
+        (["problem", "model", "methods", "evaluations of a run", "replicates", "evaluations"], raced),
+    )
+    return "\n\n".join(table(head, body) for head, body in tables if body)
 
 
 class StudyHead(SphinxDirective):

@@ -46,10 +46,12 @@ SHOWN = {
 THUMBNAILS = {  # of the figure with this name
     "mode_coupling": "gallery-mode_coupling-damping",
     "oberst2016": "occurrence",
-    "scatter": "scatter-indices",
+    "scatter": "gallery-scatter-fragility",
     "squeak_report": "gallery-squeak_report-damping",
     "method_comparison": "methods-error",
 }
+PANEL = {"method_comparison": (0.0, 0.1, 0.5, 1.0)}
+"""Study -> part of that figure to show: left, top, right, bottom, of its width and height."""
 QUICK = ("mode_coupling", "oberst2016")
 SIZE = (480, 320)
 
@@ -67,7 +69,11 @@ def main():
                 put(picture, name)
     for study, name in THUMBNAILS.items():
         with Image.open(FIGURES / f"{name}.png") as picture:
-            small = ImageOps.pad(picture.convert("RGB"), SIZE, Image.Resampling.LANCZOS, color="white")
+            box = PANEL.get(study, (0.0, 0.0, 1.0, 1.0))
+            part = picture.convert("RGB").crop(
+                tuple(round(a * b) for a, b in zip(box, picture.size * 2, strict=True))
+            )
+            small = ImageOps.pad(part, SIZE, Image.Resampling.LANCZOS, color="white")
         put(small, f"gallery-{study}")
 
 

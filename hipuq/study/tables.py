@@ -151,11 +151,11 @@ class ReportTable(Table):
     Attributes
     ----------
     friction_sweep : (float, float) or None
-        Range of the friction sweep [1]; no sweep without it.
+        Range of the friction sweep at nominal values [1]; none is drawn without it.
     friction_points : int
         Points of the sweep.
     mode_shapes : list of int
-        Modes whose shapes are drawn.
+        Modes whose shapes are drawn, at nominal values; none by default.
     shape_friction : float
         Friction at which they are drawn [1].
     pairs : list of (int, int)
@@ -163,13 +163,16 @@ class ReportTable(Table):
     mode_names : dict
         Mode -> the name it has in a publication.
     headline : str or None
-        Analysis whose probability is the first thing told; the first one with such by default.
+        Analysis whose probability is the first thing told; by default the first with one that is over nothing
+        but damping.
     damping_ratio : float or None
-        Modal damping ratio that the headline assumes, one of those that its analysis is over.
+        Modal damping ratio that the headline assumes, one of those that its analysis is over; by default 0, if it
+        is among them.
     damping_ratios : list of float
         At which the probability is computed for the headline's model and inputs, where no analysis does.
     damping_samples : int
-        Samples at each of them, at most those of the headline's analysis; 0 leaves it out.
+        Samples at each of them, fewer if the headline's analysis is plain Monte Carlo with fewer; 0 leaves it
+        out.
     targets : list of float
         Probabilities for which a friction limit is told.
     fragility_points : int
