@@ -166,8 +166,8 @@ class ReportTable(Table):
         Analysis whose probability is the first thing told; by default the first with one that is over nothing
         but damping.
     damping_ratio : float or None
-        Modal damping ratio that the headline assumes, one of those that its analysis is over; by default 0, if it
-        is among them.
+        Modal damping ratio that the headline assumes, one of those that its analysis is over; by default 0,
+        if it is among them.
     damping_ratios : list of float
         At which the probability is computed for the headline's model and inputs, where no analysis does.
     damping_samples : int
