@@ -68,7 +68,7 @@ COMPILE = pip compile --quiet --universal --python-version 3.11 --upgrade --no-a
 	--no-emit-index-url --no-emit-find-links --custom-compile-command "make lock"
 
 clean:  ## Remove the environments, caches and builds; results stay
-	rm -rf "$(VENV)" "$(LOWEST)" build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf "$(VENV)" "$(LOWEST)" build dist docs/reference/api .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	rm -f hipuq/compiled/_kernel.*
 	find hipuq tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
