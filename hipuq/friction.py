@@ -22,16 +22,11 @@ from hipuq.cea.bounds import CERTIFICATE, STRUCTURED
 from hipuq.cea.cells import Cells, stability_cells
 from hipuq.distributions import Distribution, as_distribution
 from hipuq.errors import InputError, check_name
+from hipuq.friction_range import covered, with_atoms
 from hipuq.inputs import Inputs
 from hipuq.models.base import CEAModel
 
 Array = NDArray[np.float64]
-
-TAIL = 1e-9
-"""Probability that is cut off at an end of the support that is infinite."""
-
-LARGEST = 1e3
-"""Largest modulus of friction that is swept; beyond it the elastic part of the matrix drowns in rounding."""
 
 FRICTION = "friction"
 
@@ -91,8 +86,8 @@ def integrate_friction(model: CEAModel, distribution: object) -> FrictionIntegra
 class FrictionIntegrated:
     """A model without the parameter friction, made by `integrate_friction`.
 
-    The sweep covers the support of the distribution up to `LARGEST`; an infinite end is cut where `TAIL`
-    of the probability is left. What is cut off goes into the bounds ``probability_low`` and ``_high``. A
+    The sweep covers the support of the distribution up to a modulus of 1000; an infinite end is cut where 1e-9
+    of the probability is left (`hipuq.friction_range`). What is cut off goes into the bounds ``probability_low`` and ``_high``. A
     boundary itself is stable, and so is an atom of the distribution within 1e-12 of it, relatively.
 
     Attributes
@@ -128,7 +123,7 @@ class FrictionIntegrated:
         self.model = model
         self.distribution = distribution
         self.parameters = {name: p for name, p in model.parameters.items() if name != FRICTION}
-        self.lower, self.upper = _range(distribution)
+        self.lower, self.upper = covered(distribution)
 
     @property
     def label(self) -> str:
@@ -245,7 +240,7 @@ class FrictionIntegrated:
         ]
         cells = stability_cells(
             self.model.pencils(samples),
-            *self._swept(),
+            *with_atoms(self.distribution, self.lower, self.upper),
             growth_threshold=self.model.growth_threshold,
             by_mode="probability_by_mode" in wanted,
         )
@@ -307,16 +302,6 @@ class FrictionIntegrated:
         ascending = [np.maximum.accumulate(np.clip(own, first, last)) for own in split]
         return [np.diff(np.concatenate([[first], own, [last]])) for own in ascending]
 
-    def _swept(self) -> tuple[float, float]:
-        """Return the range, a little wider at an end that is an atom: a boundary there is to be found."""
-        cdf = self.distribution.cdf
-        assert cdf is not None
-        ends = np.array([self.lower, self.upper])
-        reach = SIDE * np.abs(ends).max()
-        atom = cdf(ends) - cdf(np.nextafter(ends - [0.0, reach], -np.inf)) > TAIL
-        low, high = ends + np.where(atom, 4 * reach, 0.0) * [-1.0, 1.0]
-        return float(low), float(high)
-
 
 def _shares(mass: list[Array], verdicts: list[Array]) -> tuple[Array, Array]:
     """Return the probability of a verdict of 1, and of any; verdicts are (cells, k), results (samples, k)."""
@@ -333,24 +318,3 @@ def _onset(cells: Cells) -> float:
     if np.isnan(verdict[:first]).any():
         return np.nan
     return float(cells.edges[first]) if first < len(verdict) else np.inf
-
-
-def _range(distribution: Distribution) -> tuple[float, float]:
-    """Return the finite range that a sweep covers."""
-    lower, upper = distribution.support
-    if not np.isfinite(lower):
-        lower = float(distribution.ppf(np.array([TAIL]))[0])
-    if not np.isfinite(upper):
-        upper = float(distribution.ppf(np.array([1.0 - TAIL]))[0])
-    first = float(distribution.ppf(np.array([TAIL]))[0])
-    assert distribution.cdf is not None
-    if first > lower and float(distribution.cdf(np.array([(lower + first) / 2]))[0]) == 0:
-        # The support of a discrete distribution may begin a step below its first value.
-        lower = first
-    lower, upper = max(lower, -LARGEST), min(upper, LARGEST)
-    if not (np.isfinite([lower, upper]).all() and lower < upper):
-        raise InputError(
-            f"the distribution of friction covers {lower:g} to {upper:g} of what can be swept, at most "
-            f"{-LARGEST:g} to {LARGEST:g}: nothing to integrate over"
-        )
-    return lower, upper

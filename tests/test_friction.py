@@ -14,7 +14,7 @@ from scipy import stats
 import hipuq
 from hipuq.cea.onset import boundaries
 from hipuq.errors import InputError, UnknownNameError
-from hipuq.friction import TAIL
+from hipuq.friction_range import TAIL
 
 HOFFMANN = hipuq.models.two_dof("hoffmann2002")
 HULTEN = hipuq.models.two_dof("hulten")

@@ -39,6 +39,7 @@ ORDER = [
     ["progress"],
     ["evaluation"],
     ["intervals"],
+    ["friction_range"],
     ["friction"],
     ["fragility_curve"],
     ["friction_limits"],
