@@ -86,9 +86,10 @@ def integrate_friction(model: CEAModel, distribution: object) -> FrictionIntegra
 class FrictionIntegrated:
     """A model without the parameter friction, made by `integrate_friction`.
 
-    The sweep covers the support of the distribution up to a modulus of 1000; an infinite end is cut where 1e-9
-    of the probability is left (`hipuq.friction_range`). What is cut off goes into the bounds ``probability_low`` and ``_high``. A
-    boundary itself is stable, and so is an atom of the distribution within 1e-12 of it, relatively.
+    The sweep covers the support of the distribution up to a modulus of 1000; an infinite end is cut where
+    1e-9 of the probability is left (`hipuq.friction_range`). What is cut off goes into the bounds
+    ``probability_low`` and ``_high``. A boundary itself is stable, and so is an atom of the distribution
+    within 1e-12 of it, relatively.
 
     Attributes
     ----------
