@@ -6,7 +6,7 @@ python docs/scripts/methods.py [results/method_comparison]
 python docs/scripts/methods.py --more
 
 The first command makes the results that the second one reads; it takes about 20 minutes on two cores, and
-goes on with --resume if it is cut off. The second takes seconds, the third eight minutes: it runs what the
+goes on with --resume if it is cut off. The second takes seconds, the third some minutes: it runs what the
 study does not.
 """
 

@@ -143,34 +143,9 @@ def validate(
     population: int = POPULATION,
     groups: bool = True,
 ) -> None:
-    """Check the options of refine and estimate before anything is evaluated.
+    """Check the options of refine and estimate before anything is evaluated; `of` names all outcomes.
 
-    Parameters
-    ----------
-    inputs : Inputs
-        The uncertain parameters.
-    n : int
-        As in `design`.
-    of : sequence of str
-        Outcomes to analyse.
-    sampler : str
-        As in `design`.
-    correction : int, default 0
-        As in `refine`.
-    fit : str, optional
-        As in `estimate`.
-    degree : int, optional
-        As in `estimate`.
-    q : float, default 1
-        As in `estimate` [1].
-    interaction : int, optional
-        As in `estimate`.
-    limit : float, optional
-        As in `estimate`, in the unit of the outcome.
-    population : int, default 2**16
-        As in `estimate`.
-    groups : bool, default True
-        As in `estimate`.
+    Each option is told where it is used: in `design`, `refine` or `estimate`.
 
     Raises
     ------
